@@ -289,7 +289,8 @@ NEAREST = {
     "hybrid/orbits/closing.py": ("orbits/test_closing_rules.py",),
     "hybrid/orbits/factors.py": ("orbits/test_periodic_orbit.py", "../lyapunov/test_floquet.py"),
     "hybrid/orbits/newton.py": ("orbits/test_periodic_orbit.py",),
-    "hybrid/orbits/periodic_orbit.py": (
+    "hybrid/orbits/held.py": ("orbits/test_conserved.py",),
+    "hybrid/orbits/shooting.py": (
         "orbits/test_shooting_rules.py",
         "orbits/test_objections.py",
         "orbits/test_newton.py",

@@ -1,7 +1,8 @@
 """Build the site: ``make docs``, or ``python docs/make_site.py``; ``--links`` asks the linked sites instead.
 
 The pages of this folder, and those that are made from the sources (one per public name, one per model), go to
-``build/site/source``. Sphinx makes ``build/site/html`` of them. A warning is an error.
+``build/site/source``; the table of published numbers is computed anew, which takes half a minute. Sphinx
+makes ``build/site/html`` of them. A warning is an error.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from pathlib import Path
 from types import ModuleType
 
 from make_gallery import Picture, pictures
+from make_published import renew
 
 import models
 
@@ -54,6 +56,7 @@ def main() -> None:
     source = output / "source"
     shutil.rmtree(source, ignore_errors=True)
     write_pages(source)
+    renew(source / "published.md")
     command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "--quiet"]
     if given.links:
         # No page has to be executed for its links.

@@ -90,6 +90,12 @@ class Status:
         return f"{text} {self.remedy}" if self.remedy else text
 
 
+def noting(status: Status, *sentences: str) -> Status:
+    """The status of a complete run with more to say of it, before what it says already."""
+    rest = status.message.removeprefix(PLAIN).strip()
+    return attrs.evolve(status, message=" ".join(filter(None, [PLAIN, *sentences, rest])))
+
+
 NAME_THE_LIMIT = (
     "Add a mode for the limit (rest, stick, slide) and name it: Transition(..., accumulates_to=...)."
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid import PeriodicOrbit, arguments
+from hybrid import ArgumentError, PeriodicOrbit, arguments
 
 
 def floquet_exponents(orbit: PeriodicOrbit) -> np.ndarray:
@@ -24,6 +24,11 @@ def floquet_exponents(orbit: PeriodicOrbit) -> np.ndarray:
         In the order of the multipliers, in inverse units of time; minus infinity for a zero multiplier, a
         direction that a saltation matrix annihilates.
 
+    Raises
+    ------
+    ArgumentError
+        If the orbit has not converged; its ``log_moduli`` are those of the best point that was reached.
+
     References
     ----------
     R. I. Leine, H. Nijmeijer, "Dynamics and Bifurcations of Non-Smooth Mechanical Systems", Springer 2004,
@@ -38,4 +43,6 @@ def floquet_exponents(orbit: PeriodicOrbit) -> np.ndarray:
     array([-0.08551, -0.08551])
     """
     arguments.instance("orbit", orbit, PeriodicOrbit, "Find one with hybrid.periodic_orbit.")
+    if not orbit.status.ok:
+        raise ArgumentError(f"orbit has not converged: {orbit.status.message}")
     return orbit.log_moduli / orbit.period

@@ -8,6 +8,7 @@ from hybrid.kernels.arithmetic.tangent import orthonormalise
 from hybrid.kernels.types.codes import (
     DONE,
     ENTERING,
+    MAX_JUMPS,
     NO_TRANSITION,
     READY,
     STALE,
@@ -35,14 +36,26 @@ def later(period, cycle, phase, interval):
     return cycle, phase
 
 
-@exported(INTEGER, ADVANCE, Parts, Task, End, REAL, INTEGER, TRUTH, MATRIX, MATRIX, INDICES)
-def growth_rates(advance, parts, task, end, interval, max_steps, resumed, rates, batches, batch_state):
-    """Growth rates ``(M, k + 1)`` of ``k`` tangent vectors over ``M`` intervals (Benettin et al. 1980).
+@njit(**KERNEL)
+def advance_and_count(advance, parts, task, cycle, phase, max_steps, hits):
+    """Advance a run; the jumps that it makes are counted in ``hits (transitions,)``. Returns its code."""
+    run = task.run
+    code = advance(parts, task, cycle, phase, max_steps, run.jumps)
+    while code == MAX_JUMPS:
+        hits[run.pending] += 1
+        code = advance(parts, task, cycle, phase, max_steps, run.jumps + 1)
+    return code
 
-    The last column is the other side of the sum rule: the integral of div f plus the log-determinants of the
-    saltation matrices, per unit time. ``end`` is the end of the last interval. Each row is also added to
-    ``batches``. Returns the driver's code; ``end.done`` is how many intervals were completed. After
-    ``MAX_STEPS`` the next call resumes the interval that was not completed: ``resumed``.
+
+@exported(INTEGER, ADVANCE, Parts, Task, End, REAL, INTEGER, TRUTH, MATRIX, INDICES, MATRIX, INDICES)
+def growth_rates(advance, parts, task, end, interval, max_steps, resumed, rates, hits, batches, batch_state):
+    """Growth rates ``(M, k + 1 + T)`` of ``k`` tangent vectors over ``M`` intervals (Benettin et al. 1980).
+
+    The column after them is the other side of the sum rule: the integral of div f plus the log-determinants
+    of the saltation matrices, per unit time. The last columns are the jumps of each transition per unit time;
+    ``hits (T,)`` counts those of the interval that is under way. ``end`` is the end of the last interval.
+    Each row is also added to ``batches``. Returns the driver's code; ``end.done`` is how many intervals were
+    completed. After ``MAX_STEPS`` the next call resumes the interval that was not completed: ``resumed``.
     """
     run, period, n, tangents = task.run, task.model.period, task.model.dimension, task.tangents
     for done in range(rates.shape[0]):
@@ -51,8 +64,10 @@ def growth_rates(advance, parts, task, end, interval, max_steps, resumed, rates,
             for c in range(tangents):
                 run.growth[c] = 0.0
             run.divergence, run.log_determinant = 0.0, 0.0
+            for i in range(hits.shape[0]):
+                hits[i] = 0
             end.cycle, end.phase = later(period, end.cycle, end.phase, interval)
-        code = advance(parts, task, end.cycle, end.phase, max_steps, UNLIMITED)
+        code = advance_and_count(advance, parts, task, end.cycle, end.phase, max_steps, hits)
         if code != DONE:
             return code
         run.indistinct += orthonormalise(run.y, n, tangents, run.growth, task.work.jacobian, False, 0)
@@ -62,6 +77,8 @@ def growth_rates(advance, parts, task, end, interval, max_steps, resumed, rates,
         for c in range(tangents):
             rates[done, c] = run.growth[c] / interval
         rates[done, tangents] = (run.divergence + run.log_determinant) / interval
+        for i in range(hits.shape[0]):
+            rates[done, tangents + 1 + i] = hits[i] / interval
         push(batches, batch_state, rates[done])
     end.done = rates.shape[0]
     return DONE

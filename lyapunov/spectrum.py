@@ -33,6 +33,7 @@ from hybrid.solvers import Solver
 from hybrid.system.growth import growing
 from lyapunov.batches import closed_batch_means, new_batches
 from lyapunov.interval import End
+from lyapunov.per_transition import JumpRates, PerTransition
 
 if TYPE_CHECKING:
     import xarray
@@ -71,6 +72,8 @@ class LyapunovSpectrum:
         How the run ended.
     names
         Names of the state's components, and units where the system has them.
+    jump_rates
+        How often each transition fires, beside the growth rates, for `per`.
 
     Examples
     --------
@@ -95,6 +98,25 @@ class LyapunovSpectrum:
     x: np.ndarray
     status: Status
     names: Names
+    jump_rates: JumpRates
+
+    def per(self, transition: str) -> PerTransition:
+        """Exponents per jump of a transition instead of per unit time: ``.exponents``, ``.standard_error``.
+
+        They are the exponents times the mean time between its jumps. The errors are smaller than those of the
+        two factors where growth and jumps come together.
+
+        Parameters
+        ----------
+        transition
+            Name of the transition. Jumps that only the limit of a chatter stands for are not counted.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no such transition, or it did not fire.
+        """
+        return self.jump_rates.per(transition)
 
     @property
     def history(self) -> np.ndarray:
@@ -288,27 +310,34 @@ class Estimate:
         self.end = end_at(trajectory)
         self.task = trajectory.task(trajectory.no_record(), orthonormal=True)
         self.grazed_growth = 0.0
+        self.hits = np.zeros(len(trajectory.system.transitions), dtype=np.int64)
+
+    @property
+    def columns(self) -> int:
+        """Numbers per interval: growth rates, the other side of the sum rule, jumps of each transition."""
+        return self.trajectory.tangents + 1 + len(self.hits)
 
     def run(self, transient: int, intervals: int, history: bool, bar: Progress) -> LyapunovSpectrum:
         """The spectrum over ``intervals`` intervals, after ``transient`` intervals."""
         trajectory, k = self.trajectory, self.trajectory.tangents
         code = codes.DONE
         if transient:
-            _, code = self._collect(transient, TaperedMean(k + 1), new_batches(k + 1), False, bar)
+            scrap = TaperedMean(self.columns), new_batches(self.columns)
+            _, code = self._collect(transient, *scrap, False, bar)
             self._replace_annihilated()
             # A vector of which only rounding was left is by now a new direction, like those at the start.
             trajectory.run.indistinct = 0
-        mean, batches = TaperedMean(k + 1), new_batches(k + 1)
+        mean, batches = TaperedMean(self.columns), new_batches(self.columns)
         jumps, steps = trajectory.jumps, int(trajectory.run.steps)
         self.grazed_growth = trajectory.run.ill_conditioned_growth
         growths = np.empty((0, k))
         if code == codes.DONE:
             growths, code = self._collect(intervals, mean, batches, history, bar)
-        values = mean.value()
-        error = standard_error_from_batches(closed_batch_means(*batches)) * taper_inflation()
+        values, means = mean.value(), closed_batch_means(*batches)
+        error = standard_error_from_batches(means[:, :k]) * taper_inflation()
         return LyapunovSpectrum(
             exponents=values[:k],
-            standard_error=error[:k],
+            standard_error=error,
             sum_rule=float(values[k]),
             growths=growths,
             interval=self.interval,
@@ -319,6 +348,7 @@ class Estimate:
             x=trajectory.x,
             status=self._status(code, max(mean.count, 1)),
             names=Names(trajectory.system.state_names, dict(trajectory.system.units)),
+            jump_rates=JumpRates.of(trajectory.system, k, values, means),
         )
 
     def _collect(
@@ -329,7 +359,7 @@ class Estimate:
         bursts, code = Bursts([trajectory]), codes.DONE
         while mean.count < intervals and code == codes.DONE:
             # Add whole blocks to the mean, so that its rounding does not depend on where bursts end.
-            rates = np.empty((min(INTERVALS_AT_ONCE, intervals - mean.count), trajectory.tangents + 1))
+            rates = np.empty((min(INTERVALS_AT_ONCE, intervals - mean.count), self.columns))
             filled, resumed = 0, False
             while filled < len(rates) and code in (codes.DONE, codes.GO_ON):
                 code = self._rates(bursts.most(), resumed, rates[filled:], batches)
@@ -340,7 +370,7 @@ class Estimate:
                 resumed = code == codes.GO_ON
             mean.add(rates[:filled])
             if history:
-                kept.append(rates[:filled, :-1])
+                kept.append(rates[:filled, : trajectory.tangents])
         return np.concatenate(kept), code
 
     def _rates(self, most: int, resumed: bool, rates: np.ndarray, batches: Any) -> int:
@@ -350,12 +380,13 @@ class Estimate:
         end.done = 0
         return trajectory.plan.called(
             lambda parts: kernel(
-                advance, parts, self.task, end, self.interval, most, resumed, rates, *batches
+                advance, parts, self.task, end, self.interval, most, resumed, rates, self.hits, *batches
             ),
             trajectory.run,
             trajectory.work,
             end.counters,
             end.numbers,
+            self.hits,
             *batches,
         )
 

@@ -18,7 +18,7 @@ RUN = {**MODEL, "solver": None}
 LONG = {**RUN, "t0": 0.0, "progress": False}
 TOLERANCES = {"rtol": 1e-10, "atol": 1e-12, "max_step": float("inf"), "max_steps": 10**9}
 CHECKING = {"rtol": 1e-12, "atol": 1e-14, "max_step": float("inf"), "max_steps": 20_000}
-PLAIN = {"parameters": None, "period": None, "name": "", "units": None, "laws": None}
+PLAIN = {"parameters": None, "period": None, "name": "", "units": None, "angles": None, "laws": None}
 SEARCH = {
     **{**LONG, "progress": None, "section": None, "interval": None, "periods": 1000, "recurrences": 10},
     "tolerance": 0.01,
@@ -50,7 +50,7 @@ DEFAULTS = {
     hybrid.continue_orbit: {"solver": None, "max_steps": 2000, "progress": None},
     hybrid.continue_bifurcation: {"solver": None, "max_steps": 500, "progress": None},
     hybrid.open_branch: {},
-    hybrid.filippov: {"start": None, "period": None, "name": "", "units": None, "laws": None},
+    hybrid.filippov: {"start": None, "period": None, "name": "", "units": None, "angles": None, "laws": None},
     hybrid.from_equations: PLAIN,
     hybrid.Laws: {
         **dict.fromkeys(

@@ -2,9 +2,14 @@
 
 import re
 
+import matplotlib as mpl
+import numpy as np
 import pytest
 
+mpl.use("Agg")
+
 import hybrid
+import hybrid.plot
 import lyapunov
 import models
 
@@ -28,6 +33,23 @@ def test_an_orbit_shows_its_transitions_and_the_sign_of_its_multiplier():
     assert re.search(r"through 'impact', largest multiplier -0\.584295 \+- 0\.0056\d*i,", repr(pair))
     flipped = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0), parameters={"r": 0.3})
     assert "largest multiplier -" in repr(flipped)
+
+
+def test_a_point_that_is_no_orbit_does_not_look_like_one():
+    """Its line, its picture and its exponents say so; the numbers of the best point are kept."""
+    point = hybrid.periodic_orbit(models.impact_oscillator(), (0.0, 0.0), max_iterations=1)
+    assert repr(point).startswith(
+        f"<PeriodicOrbit NOT CONVERGED, residual {point.residual:.1e} after a period "
+    )
+    assert "multiplier" not in repr(point)
+    title = hybrid.plot.plot_orbit(point).get_title(loc="left")
+    assert title.startswith("NOT CONVERGED, residual ")
+    with pytest.raises(hybrid.ArgumentError, match="orbit has not converged: Newton's method did not"):
+        lyapunov.floquet_exponents(point)
+    assert np.all(np.isfinite(point.multipliers))
+    solver = hybrid.DOP853(max_steps=5)
+    ended = hybrid.periodic_orbit(models.impact_oscillator(), (0.0, 0.0), solver=solver)
+    assert repr(ended).startswith("<PeriodicOrbit NO ORBIT, MAX_STEPS, residual ")
 
 
 def test_a_system_shows_a_number_for_its_period():

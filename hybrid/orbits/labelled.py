@@ -9,6 +9,7 @@ import numpy as np
 
 from hybrid.display.tables import html_table, with_unit
 from hybrid.simulation.labelled import Names, attributes
+from hybrid.status import StatusCode
 
 if TYPE_CHECKING:
     import xarray
@@ -39,7 +40,12 @@ def labelled_orbit(orbit: Any) -> xarray.Dataset:
 
 
 def described_orbit(orbit: Any) -> str:
-    """A :class:`hybrid.PeriodicOrbit` in one line: where it goes, its largest multiplier with its sign."""
+    """A :class:`hybrid.PeriodicOrbit` in one line: where it goes, its largest multiplier with its sign.
+
+    A point that is no orbit is not described as one: the line says how far from closing it is.
+    """
+    if not orbit.status.ok:
+        return f"<PeriodicOrbit {unfinished(orbit)}: {orbit.status.message}>"
     through = f" through {', '.join(map(repr, orbit.transitions))}" if orbit.transitions else ""
     largest = orbit.multipliers[0]
     pair = f" +- {abs(largest.imag):.6g}i" if largest.imag else ""
@@ -62,3 +68,10 @@ def tabled_orbit(orbit: Any) -> str:
     ]
     said = f"<p>{escape(repr(orbit))}</p>\n<p>{escape(f'at t = {orbit.t0:.6g}: {point}')}</p>"
     return f"{said}\n{html_table(('multiplier', 'modulus'), rows)}"
+
+
+def unfinished(orbit: Any) -> str:
+    """What a search without success left, in words: how far its best point is from an orbit."""
+    code = orbit.status.code
+    word = "NOT CONVERGED" if code == StatusCode.NOT_CONVERGED else f"NO ORBIT, {code.name}"
+    return f"{word}, residual {orbit.residual:.1e} after a period of {orbit.period:.9g} from {orbit.mode!r}"

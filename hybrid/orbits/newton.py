@@ -7,6 +7,7 @@ import numpy as np
 
 from hybrid.orbits.rest import EPSILON, Drift
 from hybrid.status import Status
+from hybrid.system.periodicity import closed_change
 
 # Rounding of the end of an orbit, in units in the last place of its largest states: the largest gap accepted
 # when Newton's method makes no more progress.
@@ -29,12 +30,38 @@ class Point:
 
 
 @attrs.frozen(eq=False)
+class Departure:
+    """Distances ``off (h,)`` from the held values of conserved quantities, and the slopes ``(h, n)``."""
+
+    off: np.ndarray
+    slopes: np.ndarray
+
+    def sizes(self, scale: np.ndarray) -> np.ndarray:
+        """What a step of one ``scale (n,)`` changes the quantities by ``(h,)``."""
+        found = np.linalg.norm(self.slopes * scale, axis=1)
+        return np.where(found > 0.0, found, 1.0)
+
+    def rows(self, scale: np.ndarray) -> np.ndarray:
+        """The gradients ``(h, n)`` in the scaled state, each of length one."""
+        return np.asarray(self.slopes * scale / self.sizes(scale)[:, None])
+
+    def distances(self, scale: np.ndarray) -> np.ndarray:
+        """Distances ``(h,)`` from the held values in the scaled state."""
+        return np.asarray(self.off / self.sizes(scale))
+
+    def within(self, known: np.ndarray) -> bool:
+        """Whether the point has the held values, as far as its components are ``known (n,)``."""
+        return bool(np.all(np.abs(self.off) <= np.abs(self.slopes) @ known))
+
+
+@attrs.frozen(eq=False)
 class Shot:
     """What one integration over the period gives.
 
     ``extent (n,)`` is how far each component moves, ``magnitude (n,)`` its largest absolute value. ``drift``
     knows how far components at rest are carried. ``beyond`` names the transitions whose guards the start lies
-    beyond.
+    beyond. ``departure`` is how far the start is from the values of conserved quantities that are held.
+    ``lengths (n,)`` are those of a turn of angles, 0 for other components.
     """
 
     point: Point
@@ -49,11 +76,15 @@ class Shot:
     status: Status
     drift: Drift | None = None
     beyond: tuple[str, ...] = ()
+    departure: Departure | None = None
+    lengths: np.ndarray | None = None
 
     @property
     def gap(self) -> np.ndarray:
-        """Distance ``(n,)`` from the start to the end."""
+        """Distance ``(n,)`` from the start to the end, without whole turns of angles."""
         gap = self.end - self.point.x
+        if self.lengths is not None:
+            gap = closed_change(gap, self.lengths)
         if self.drift is not None:
             gap[self.drift.components] = self.drift.moved
         return gap
@@ -83,7 +114,10 @@ class Shot:
 
     def size(self, scale: np.ndarray) -> float:
         """The residual in units of ``scale (n,)``, infinite where there is none."""
-        return length(self.gap / scale) if self.whole else np.inf
+        if not self.whole:
+            return np.inf
+        gap = self.gap / scale
+        return length(gap if self.departure is None else np.append(gap, self.departure.distances(scale)))
 
     def closes(self, tolerance: float, rounding: np.ndarray, nothing: np.ndarray | float = 0.0) -> bool:
         """Whether the ends agree to a share of the orbit's motion, or to rounding, in every component.
@@ -95,6 +129,8 @@ class Shot:
         if self.drift is not None:
             known = np.maximum(tolerance * self.extent, ROUNDING_OF_GAP * EPSILON * self.magnitude)
             most[self.drift.components] = self.drift.blur + np.abs(self.drift.slopes) @ known
+        if self.departure is not None and not self.departure.within(most):
+            return False
         return self.whole and bool(np.all(np.abs(self.gap) <= np.maximum(most, nothing)))
 
 
@@ -163,12 +199,28 @@ class Newton:
         the shot is nearly singular; ``farthest`` is a share of the scale.
         """
         n = len(shot.end)
-        left, sizes, _ = np.linalg.svd(self._matrix(shot))
+        left, sizes, _ = np.linalg.svd(self._matrix(shot), full_matrices=False)
         units = self.measure(shot)
         parts = left.T @ self._right(shot, units)
         far = left[:, np.abs(parts) > farthest * sizes]
         along = far.T @ self._right(other, units)
         return (far * along)[:n] * units[:, None]
+
+    def free_directions(self, shot: Shot, other: Shot) -> bool:
+        """Whether orbits are side by side: a direction of the start that the equations leave free.
+
+        The smallest singular value of the matrix is then no larger than the error of the matrix, which the
+        ``other`` shot tells: one with tighter tolerances, after the next step.
+        """
+        matrix = self._matrix(shot)
+        sizes = np.linalg.svd(matrix, compute_uv=False)
+        error = float(np.linalg.norm(self._matrix(other) - matrix, 2))
+        return bool(sizes[-1] <= 2.0 * error + len(matrix) * EPSILON * sizes[0])
+
+    def nearly_singular(self, shot: Shot, share: float) -> bool:
+        """Whether the smallest singular value of the matrix is at most a share of the largest."""
+        sizes = np.linalg.svd(self._matrix(shot), compute_uv=False)
+        return bool(sizes[-1] <= share * sizes[0])
 
     def led_astray(self, shot: Shot, farthest: float) -> bool:
         """Whether the method went far along a direction in which the matrix is zero to rounding.
@@ -186,16 +238,19 @@ class Newton:
         """Derivatives of the gap, and of the place in the plane, in the state and in the period."""
         units = self.measure(shot)
         matrix = shot.slopes / units[:, None] * self.scale
-        if not self.free_period:
+        if self.free_period:
+            speed = shot.end_field / units * shot.point.period
+            matrix = np.block([[matrix, speed[:, None]], [self._across()[None, :], np.zeros((1, 1))]])
+        if shot.departure is None:
             return matrix
-        speed = shot.end_field / units * shot.point.period
-        return np.block([[matrix, speed[:, None]], [self._across()[None, :], np.zeros((1, 1))]])
+        held = shot.departure.rows(self.scale)
+        return np.vstack([matrix, np.pad(held, ((0, 0), (0, matrix.shape[1] - held.shape[1])))])
 
     def _right(self, shot: Shot, units: np.ndarray) -> np.ndarray:
         gap = shot.gap / units
-        if not self.free_period:
-            return -gap
-        return np.append(-gap, -self._across() @ ((shot.point.x - self.anchor) / self.scale))
+        if self.free_period:
+            gap = np.append(gap, self._across() @ ((shot.point.x - self.anchor) / self.scale))
+        return -gap if shot.departure is None else -np.append(gap, shot.departure.distances(self.scale))
 
     def _across(self) -> np.ndarray:
         """The unit normal ``(n,)`` of the plane."""

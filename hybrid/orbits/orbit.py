@@ -21,6 +21,7 @@ from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver, Taylor
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
+from hybrid.system.periodicity import whole_turns
 
 if TYPE_CHECKING:
     import xarray
@@ -32,6 +33,11 @@ MOMENT = 1e-8
 @attrs.frozen(eq=False, repr=False)
 class PeriodicOrbit:
     """A periodic orbit, or the best point that Newton's method reached.
+
+    Where ``status.ok`` is false there is no orbit. Multipliers, logarithms and the fundamental matrix are
+    then those of the run over the period from the best point; they say nothing of the stability of an orbit.
+    What builds on orbits (`continue_orbit`, `sensitivity`,
+    `lyapunov.floquet_exponents`) refuses such a point.
 
     Attributes
     ----------
@@ -62,6 +68,8 @@ class PeriodicOrbit:
         Names of the transitions in the order they fire.
     status
         Whether Newton's method converged, and how far it got if not.
+    turns
+        Whole turns of each angle of the system over the period, by name.
 
     Examples
     --------
@@ -88,6 +96,7 @@ class PeriodicOrbit:
     signature: tuple[str, ...]
     transitions: tuple[str, ...]
     status: Status
+    turns: Mapping[str, int] = attrs.field(factory=dict)
 
     def __repr__(self) -> str:
         return described_orbit(self)
@@ -142,3 +151,9 @@ class PeriodicOrbit:
 
     def _run(self, x: np.ndarray, t: float, end: float, mode: str, solver: Solver | None) -> HybridArc:
         return simulate(self.system, x, (t, end), mode=mode, parameters=self.parameters, solver=solver)
+
+
+def turns_over(system: HybridSystem, change: np.ndarray) -> dict[str, int]:
+    """Whole turns of each angle in a change ``(n,)`` of the state, by name."""
+    turns = dict(zip(system.state_names, whole_turns(change, system.turn_lengths).tolist(), strict=True))
+    return {name: int(turns[name]) for name in system.angles}

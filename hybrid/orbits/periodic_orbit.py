@@ -11,53 +11,14 @@ from numpy.typing import ArrayLike
 from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
-from hybrid.orbits.closing import advance_to_close, same_time
-from hybrid.orbits.factors import fundamental_eigenvalues
-from hybrid.orbits.newton import ROUNDING_OF_GAP, Newton, Point, Shot, length
+from hybrid.orbits.newton import Point
 from hybrid.orbits.orbit import PeriodicOrbit
-from hybrid.orbits.periodic_schur import ProductEigenvalues
-from hybrid.orbits.rest import EPSILON, drift
-from hybrid.simulation.arc import HybridArc
-from hybrid.simulation.ending import status_of
+from hybrid.orbits.shooting import Shooting
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
-from hybrid.simulation.jumps import Jump
-from hybrid.simulation.periods import split_time
 from hybrid.simulation.plan import check_solver
-from hybrid.simulation.simulate import simulate
-from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import DOP853, Solver
-from hybrid.status import Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.growth import growing
-
-# Points, besides the solver's own, that show how far an orbit moves.
-SAMPLES = 65
-# The smallest gap that Newton's method can reach, in units in the last place of the largest states.
-FINEST_GAP = 4
-# Newton steps are halved at most to this share.
-SHORTEST_STEP = 1 / 64
-# A period below this share of the guess is a point, not an orbit.
-SHORTEST_PERIOD = 1e-3
-# Most jumps of the guess that are examined to find a point away from jumps.
-MOST_JUMPS_LOOKED_AT = 10_000
-# An autonomous orbit moves by more than this many times the accepted rounding.
-LEAST_MOTION = 1e3
-# Share of its states by which a point that hardly moves may still be wrong.
-POINT_ERROR = 1e-8
-# Where Newton's method cannot tell which of many orbits it is at, that is one only if it closes up to this
-# share of its motion, is at most so many times larger than the solution through the guess, and the last step
-# moved it by less than a share of its motion.
-DRIFT = 1e-3
-FARTHEST = 1e3
-SETTLED = 0.1
-# And it closes better the tighter the tolerances are: by this factor, where they are tighter by its square.
-TIGHTER = 10.0
-# The guess of a period is changed by this share at most, if the solution then returns that much nearer.
-PERIOD_OFF = 0.1
-NEARER = 0.5
-# Directions in which the matrix of Newton's method is smaller than this share of its size may be those of a
-# family of orbits.
-NEARLY_SINGULAR = 1e-5
 
 
 @growing
@@ -79,6 +40,10 @@ def periodic_orbit(
     A forced system (one that declares a period) closes after ``periods`` forcing periods from ``t0``. An
     autonomous system closes after an unknown time near the guess ``period``; the returned point is the
     solver's own point, away from jumps, that is nearest to the guess.
+
+    A conserved quantity makes orbits come in families, one orbit per value. Quantities that the system
+    declares with ``laws=Laws(conserved=...)`` are held at their values at the guess, and the status names
+    them. An orbit that is still one of many, since a multiplier is 1 besides that of the flow, says so.
 
     Parameters
     ----------
@@ -103,9 +68,9 @@ def periodic_orbit(
     Returns
     -------
     PeriodicOrbit
-        With a status that says how far the method came if it did not converge. An equilibrium of a forced
-        system counts as an orbit, because it repeats after each forcing period; an equilibrium of an
-        autonomous system does not.
+        It closes up to whole turns of the angles that the system declares. If Newton's method did not
+        converge the status says how far it came. An equilibrium of a forced system counts as an orbit,
+        because it repeats after each forcing period; an equilibrium of an autonomous system does not.
 
     Raises
     ------
@@ -135,7 +100,7 @@ def periodic_orbit(
     if not tolerance < 1.0:
         raise arguments.refusal("tolerance", "be above 0 and below 1", tolerance)
     method = DOP853(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
-    shooting = _Shooting(system, mode, parameters, method)
+    shooting = Shooting(system, mode, parameters, method)
     forcing = system.forcing_period(parameters)
     if forcing is not None:
         if period is not None:
@@ -145,7 +110,7 @@ def periodic_orbit(
         point = Point(guess, t0, periods * forcing)
         compile_system(system)
         with CTRL_C:
-            return _kept(shooting.newton(point, False, tolerance, max_iterations))
+            return _kept(shooting.hinted(shooting.newton(point, False, tolerance, max_iterations), point))
     if period is None:
         raise ArgumentError("An autonomous system needs a guess of its period: give period=.")
     length = arguments.positive("period", period)
@@ -153,7 +118,8 @@ def periodic_orbit(
         raise arguments.refusal("period", "be a time that the clock can reach twice", length)
     compile_system(system)
     with CTRL_C:
-        return _kept(shooting.autonomous(Point(guess, t0, length), tolerance, max_iterations))
+        point = Point(guess, t0, length)
+        return _kept(shooting.hinted(shooting.autonomous(point, tolerance, max_iterations), point))
 
 
 def _kept(orbit: PeriodicOrbit) -> PeriodicOrbit:
@@ -161,285 +127,3 @@ def _kept(orbit: PeriodicOrbit) -> PeriodicOrbit:
     if not CTRL_C.is_set():
         return orbit
     return attrs.evolve(orbit, status=interrupted_status("the best point so far"))
-
-
-@attrs.frozen(eq=False)
-class _Shooting:
-    system: HybridSystem
-    mode: str | None
-    parameters: Mapping[str, float] | None
-    solver: Solver
-
-    def shoot(self, point: Point) -> Shot:
-        trajectory = self._trajectory(point, self.mode)
-        mode, field = trajectory.mode, trajectory.field()
-        code = advance_to_close(trajectory, *split_time(point.t + point.period, trajectory.model.period))
-        arc = self._follow(point, point.period, mode)
-        states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], SAMPLES))])
-        extent, magnitude = np.ptp(states, axis=0), np.abs(states).max(axis=0)
-        at_rest, carried = extent <= ROUNDING_OF_GAP * EPSILON * magnitude, None
-        if np.any(at_rest) and code == StatusCode.SUCCESS and len(arc.jumps) <= MOST_JUMPS_LOOKED_AT:
-            again, end = self._trajectory(point, self.mode), point.t + point.period
-            carried = drift(again, end, arc.jumps.t, at_rest, magnitude)
-        return Shot(
-            point,
-            mode,
-            trajectory.x,
-            trajectory.mode,
-            trajectory.tangent_matrix,
-            field,
-            trajectory.field(),
-            extent,
-            magnitude,
-            status_of(trajectory, code),
-            carried,
-            trajectory.beyond,
-        )
-
-    def _trajectory(self, point: Point, mode: str | None) -> Trajectory:
-        """A run from a point that carries the columns of the identity."""
-        return start(
-            self.system,
-            point.x,
-            point.t,
-            mode=mode,
-            parameters=self.parameters,
-            solver=self.solver,
-            tangent=np.eye(self.system.dimension),
-        )
-
-    def newton(self, point: Point, free_period: bool, tolerance: float, max_iterations: int) -> PeriodicOrbit:
-        """Newton's method from ``point``; the period may be unknown too."""
-        shot, iterations = self.shoot(point), 0
-        newton = Newton.begin(shot, self.solver.atol, free_period)
-        while iterations < max_iterations and shot.whole and newton.measurable(shot):
-            if shot.closes(tolerance, FINEST_GAP * EPSILON * shot.magnitude):
-                break
-            better = self._along(shot, newton)
-            iterations += 1
-            if better is None:
-                break
-            newton = newton.advanced(shot, better)
-            shot = better
-        return self._result(shot, iterations, self._status(shot, newton, iterations, tolerance))
-
-    def _along(self, shot: Shot, newton: Newton) -> Shot | None:
-        """The shot after the step, or after a shorter one, that closes better; None if there is none.
-
-        Where orbits come in families, the step along the family is arbitrary and may be long, so the step
-        without it is tried too.
-        """
-        full, units = newton.step(shot), newton.measure(shot)
-        best = self._better(shot, shot, units, full)
-        if best.size(units) > NEARER * shot.size(units):
-            best = self._better(best, shot, units, newton.step(shot, NEARLY_SINGULAR))
-        part = 1.0
-        while best is shot and part > SHORTEST_STEP:
-            part /= 2
-            best = self._better(shot, shot, units, full, part)
-        return None if best is shot else best
-
-    def _better(
-        self, best: Shot, shot: Shot, units: np.ndarray, step: tuple[np.ndarray, float], part: float = 1.0
-    ) -> Shot:
-        """The best shot so far, or the one after a part of a step from ``shot`` if that closes better.
-
-        Gaps are compared in ``units (n,)``.
-        """
-        change, longer = step
-        period = shot.point.period + part * longer
-        if not period > 0:
-            return best
-        try:
-            trial = self.shoot(attrs.evolve(shot.point, x=shot.point.x + part * change, period=period))
-        except ArgumentError:
-            # No mode allows the point.
-            return best
-        # A step through a guard leads to other events.
-        crossed = set(trial.beyond) - set(shot.beyond)
-        return best if crossed or not trial.size(units) < best.size(units) else trial
-
-    def autonomous(self, guess: Point, tolerance: float, max_iterations: int) -> PeriodicOrbit:
-        """Newton's method from the point of the guess's orbit farthest from jumps, then back to the guess.
-
-        At a jump the end of the shot would depend discontinuously on the period.
-        """
-        shift = self._quiet_time(guess)
-        shooting, moved = self._moved(guess, shift)
-        orbit = shooting.newton(moved, True, tolerance, max_iterations)
-        if orbit.period < SHORTEST_PERIOD * guess.period:
-            # Every point closes after no time at all.
-            status = Status(
-                StatusCode.NOT_CONVERGED,
-                f"The period shrank from {guess.period:.3g} to {orbit.period:.3g}: a point, no orbit.",
-                "Start nearer to the orbit, with a better guess of its period.",
-            )
-            return attrs.evolve(orbit, status=status)
-        if not orbit.status.ok:
-            return orbit
-        return self._nearest(orbit, guess)
-
-    def _quiet_time(self, guess: Point) -> float:
-        """Time after the guess at which neither it nor one period later is close to a jump."""
-        arc = self._follow(guess, 2 * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
-        jumps = np.concatenate([[0.0], arc.jumps.t - guess.t])
-        candidates = np.linspace(0, guess.period, 201)[1:-1]
-        distance = np.minimum(
-            np.abs(candidates[:, None] - jumps).min(axis=1),
-            np.abs(candidates[:, None] + guess.period - jumps).min(axis=1),
-        )
-        return float(candidates[np.argmax(distance)])
-
-    def _moved(self, guess: Point, shift: float) -> tuple[_Shooting, Point]:
-        arc = self._follow(guess, shift, self.mode)
-        shooting = attrs.evolve(self, mode=str(arc.mode[-1]))
-        moved = Point(arc.x[-1], guess.t + shift, guess.period)
-        return shooting, attrs.evolve(moved, period=shooting._time_of_return(moved))
-
-    def _time_of_return(self, guess: Point) -> float:
-        """The guessed period, or a time near it at which the solution returns much nearer to its start.
-
-        With a wrong period, Newton's method prefers smaller orbits where orbits come in families.
-        """
-        arc = self._follow(guess, (1 + PERIOD_OFF) * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
-        times = guess.period * (1 + PERIOD_OFF * np.linspace(-1, 1, 2 * SAMPLES - 1))
-        if not arc.status.ok:
-            return guess.period
-        extent = np.ptp(arc.x, axis=0)
-        gaps = np.linalg.norm((arc(guess.t + times) - guess.x) / np.where(extent > 0, extent, 1.0), axis=1)
-        nearest = int(np.argmin(gaps))
-        return float(times[nearest]) if gaps[nearest] < NEARER * gaps[SAMPLES - 1] else guess.period
-
-    def _nearest(self, orbit: PeriodicOrbit, guess: Point) -> PeriodicOrbit:
-        """The same orbit from the point of its arc, away from jumps, that is nearest to the guess."""
-        arc = orbit.arc(self.solver)
-        extent = np.ptp(arc.x, axis=0)
-        # Distances in units of the orbit, so that those of the states do not matter.
-        apart = (arc.x - guess.x) / np.where(extent > 0, extent, 1.0)
-        times = arc.jumps.t
-        # On a jump, rounding would decide whether a run from the point makes it.
-        away = [np.all(np.abs(times - t) > POINT_ERROR * orbit.period) for t in arc.t]
-        i = int(np.argmin(np.where(away, np.linalg.norm(apart, axis=1), np.inf)))
-        return attrs.evolve(orbit, x0=arc.x[i], mode=str(arc.mode[i]), t0=float(arc.t[i]))
-
-    def _result(self, shot: Shot, iterations: int, status: Status) -> PeriodicOrbit:
-        eigenvalues, jumps = self._eigenvalues(shot), self._jumps(shot)
-        return PeriodicOrbit(
-            system=self.system,
-            parameters=self._all_parameters(),
-            x0=shot.point.x,
-            mode=shot.mode,
-            t0=shot.point.t,
-            period=float(shot.point.period),
-            multipliers=eigenvalues.values,
-            log_moduli=eigenvalues.log_moduli,
-            fundamental=shot.fundamental,
-            residual=length(shot.gap),
-            iterations=iterations,
-            signature=(shot.mode, *(jump.target for jump in jumps if jump.target is not None)),
-            transitions=tuple(jump.transition for jump in jumps),
-            status=status,
-        )
-
-    def _all_parameters(self) -> dict[str, float]:
-        values = self.system.parameter_values(self.parameters).tolist()
-        return dict(zip(self.system.parameters, values, strict=True))
-
-    def _eigenvalues(self, shot: Shot) -> ProductEigenvalues:
-        """Those of the fundamental matrix from its factors, or nan where the run does not reach its end."""
-        return fundamental_eigenvalues(
-            lambda: self._trajectory(shot.point, shot.mode), shot.point.t + shot.point.period
-        )
-
-    def _drifts(self, shot: Shot, newton: Newton, tolerance: float) -> bool:
-        """Whether the part of the gap that no step removes is more than the error of the solver.
-
-        A solution that drifts does so at any tolerance.
-        """
-        finer = attrs.evolve(self, mode=shot.mode, solver=self.solver.tightened(TIGHTER**2)).shoot(shot.point)
-        if not finer.whole:
-            return True
-        rough, drift = (newton.drift(shot, each, np.sqrt(tolerance)) for each in (shot, finer))
-        noise = np.maximum(np.abs(rough - drift) / TIGHTER, shot.rounding[:, None])
-        return bool(np.any(np.abs(drift) > noise))
-
-    def _jumps(self, shot: Shot) -> list[Jump]:
-        """The jumps of one period; those at its point are counted once."""
-        arc = self._follow(shot.point, shot.point.period, shot.mode)
-        jumps, begin, end = list(arc.jumps), shot.point.t, shot.point.t + shot.point.period
-        size = abs(begin) + shot.point.period
-        if jumps and same_time(jumps[0].t, begin, size):
-            jumps = [jump for jump in jumps if not same_time(jump.t, end, size)]
-        return jumps
-
-    def _follow(self, point: Point, span: float, mode: str | None, max_jumps: int = 100_000) -> HybridArc:
-        """The arc from a point over a time, without tangent vectors."""
-        return simulate(
-            self.system,
-            point.x,
-            (point.t, point.t + span),
-            mode=mode,
-            parameters=self.parameters,
-            solver=self.solver,
-            max_jumps=max_jumps,
-        )
-
-    def _status(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> Status:
-        """How Newton's method ended: with an orbit, or why there is none."""
-        if not shot.status.ok:
-            return shot.status
-        reason = self._objection(shot, newton, iterations, tolerance)
-        if reason is None:
-            # With what the run along the orbit has to say of its crossings and its tangent vectors.
-            return shot.status
-        return Status(
-            StatusCode.NOT_CONVERGED,
-            f"Newton's method did not converge: {reason}.",
-            "Start nearer to the orbit (simulate first if it is stable), or raise max_iterations; if states "
-            "are small, give a solver= with a lower atol.",
-        )
-
-    def _objection(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> str | None:
-        """Why the last shot is no periodic orbit, or None if it is one.
-
-        The ends agree; the orbit moves, if nothing but its motion has a period; and what is left of Newton's
-        step is small. At infinity, or where a solution drifts, the ends may agree and that step is large. It
-        is arbitrary where orbits come in families: then the orbit has to be near to the guess, the method has
-        to have settled at it, and the solver's error alone may keep it from closing.
-        """
-        if shot.end_mode != shot.mode:
-            return f"the orbit ends in mode {shot.end_mode!r} and starts in {shot.mode!r}"
-        if not shot.whole or not newton.measurable(shot):
-            return "the tangent vectors left the range of numbers"
-        growth = shot.growth(newton.scale)
-        if not growth * EPSILON < 1.0:
-            return (
-                f"errors of the start grow by a factor of {growth:.3g} over the period, so no digit is left"
-            )
-        largest = np.abs([newton.anchor, shot.point.x, shot.end]).max()
-        if 0.0 < largest <= self.solver.atol:
-            return (
-                f"all states are below the atol of the solver, {self.solver.atol:.3g}, and so not controlled"
-            )
-        # A component that is below the solver's absolute tolerance throughout counts as zero.
-        nothing = np.where(shot.magnitude <= self.solver.atol, self.solver.atol, 0.0)
-        if not shot.closes(tolerance, shot.rounding, nothing):
-            return f"the residual is {length(shot.gap):.3g} after {iterations} iterations"
-        noise = np.maximum(ROUNDING_OF_GAP * EPSILON * shot.magnitude, nothing)
-        if newton.free_period and not np.any(shot.extent > LEAST_MOTION * noise):
-            return f"it led to an equilibrium: the state moves by {shot.extent.max():.3g} in all"
-        step, _ = newton.step(shot)
-        enough = np.maximum(np.sqrt(tolerance) * shot.extent, POINT_ERROR * shot.magnitude)
-        if newton.led_astray(shot, FARTHEST):
-            return "it went far along a direction in which the ends do not tell where an orbit is"
-        if np.all(np.abs(step) <= np.maximum(enough, nothing)):
-            return None
-        near = np.all((shot.extent <= FARTHEST * newton.first) & (np.abs(shot.gap) <= DRIFT * shot.extent))
-        sizes = np.where(shot.extent > noise, shot.extent, shot.magnitude)
-        settled = np.all(np.abs(newton.moved) <= np.maximum(SETTLED * sizes, noise))
-        if near and settled and not self._drifts(shot, newton, tolerance):
-            return None
-        return (
-            f"the ends agree to {length(shot.gap):.3g}, but the next step would move the start by "
-            f"{length(step):.3g}: the solution drifts, or no orbit is near"
-        )

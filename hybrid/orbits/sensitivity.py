@@ -50,8 +50,7 @@ def sensitivity_of(place: Place, t: float) -> OrbitSensitivity:
         If the orbit is not isolated.
     """
     orbit, units, matrix, k = place.orbit, place.units, place.matrix, len(place.sizes)
-    sizes = np.linalg.svd(matrix[:, :-k], compute_uv=False)
-    if not sizes[-1] > SINGULAR * sizes[0]:
+    if not is_isolated(place):
         raise _no_derivative(place)
     slopes = np.linalg.solve(matrix[:, :-k], -matrix[:, -k:] / units[-k:]) * units[:-k, None]
     first = orbit.loop.x.size
@@ -62,6 +61,12 @@ def sensitivity_of(place: Place, t: float) -> OrbitSensitivity:
         slopes[-1] - slopes[first],
         np.stack(columns, axis=-1),
     )
+
+
+def is_isolated(place: Place) -> bool:
+    """Whether there is no other orbit beside one, at the same parameters."""
+    sizes = np.linalg.svd(place.matrix[:, : -len(place.sizes)], compute_uv=False)
+    return bool(sizes[-1] > SINGULAR * sizes[0])
 
 
 def _of_point(orbit: Pass, slopes: np.ndarray, t: float) -> np.ndarray:

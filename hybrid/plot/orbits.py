@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybrid import arguments
+from hybrid.orbits.labelled import unfinished
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.sections import Section
 from hybrid.plot.arcs import plot_phase
@@ -91,6 +92,8 @@ def plot_orbit(
 ) -> Axes:
     """Draw a periodic orbit in the plane of two components, with its period and largest multiplier.
 
+    Where the search did not converge the title says so, and has no multiplier.
+
     Parameters
     ----------
     orbit
@@ -131,7 +134,8 @@ def plot_orbit(
     period = f"{orbit.period:.6g} {orbit.system.units.get('t', '')}".rstrip()
     # The row of the legend stands between the axes and the title.
     pad = 6.0 if ax.get_legend() is None else 24.0
-    ax.set_title(f"period {period}, largest multiplier {number}", loc="left", fontsize=9, pad=pad)
+    told = f"period {period}, largest multiplier {number}" if orbit.status.ok else unfinished(orbit)
+    ax.set_title(told, loc="left", fontsize=9, pad=pad)
     return ax
 
 

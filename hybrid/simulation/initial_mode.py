@@ -10,6 +10,7 @@ import numpy as np
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
+from hybrid.simulation.kinks import move_alike
 from hybrid.system.elements import Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.system.growth import Unexplored
@@ -23,7 +24,9 @@ def choose_mode(
 ) -> tuple[int, tuple[str, ...]]:
     """Index of the mode to start in: the one named, the only one, or the only one that allows the state.
 
-    If the mode is named, or the only one, the transitions whose guards the state lies beyond come too.
+    On a kink of a continuous field that the flow does not leave at once, the modes on all sides allow the
+    state, and their motion is the same: the first of them is taken. If the mode is named, or the only one,
+    the transitions whose guards the state lies beyond come too.
 
     Raises
     ------
@@ -41,8 +44,8 @@ def choose_mode(
             # Guards of the user's may be crossed, as the mode is named; the sides of its parts must be right.
             against = [(tr.part_of, tr.source) for tr in _against(system, verdicts)]
             within = [i for i in within if (None, modes[i]) not in against]
-        if len(within) == 1:
-            [index] = within
+        if len(within) == 1 or move_alike(system, model, run, [modes[i] for i in within]):
+            index = within[0]
             said = zip(system.transitions, verdicts, strict=True)
             beyond = [tr for tr, verdict in said if verdict == codes.BEYOND and tr.source == modes[index]]
             return index, tuple(tr.name for tr in beyond)
@@ -53,7 +56,7 @@ def choose_mode(
         # Otherwise it may be a guard of modes to which the state does not belong.
         raise _undefined(system, run, *min(undefined.items()))
     allowed = [name for name in modes if name not in violated]
-    if len(allowed) == 1:
+    if len(allowed) == 1 or move_alike(system, model, run, allowed):
         return modes.index(allowed[0]), ()
     return _refused(system, run, verdicts, allowed)
 

@@ -13,8 +13,9 @@ from hybrid import arguments
 from hybrid.errors import ModelError
 from hybrid.system.derivatives import check_derivative, evaluate, sample_points
 from hybrid.system.functions import CONDITION, ModelFunction, WholeReset
-from hybrid.system.periodicity import Period, period_at, period_fault
+from hybrid.system.periodicity import Period, angle_fault_at, period_at, period_fault
 from hybrid.system.variables import Variables
+from hybrid.system.watched import is_of_library
 
 SAMPLE_TIME = np.float64(0.7548776662466927)
 # Multiples of an irrational number modulo 1 give every component another value, away from kinks and
@@ -40,6 +41,22 @@ def check_functions(variables: Variables, functions: Sequence[ModelFunction], pe
     if callable(period):
         _check_period_function(variables, period)
     _check_period(variables, functions, period)
+
+
+def check_angles(variables: Variables, functions: Sequence[ModelFunction], lengths: np.ndarray) -> None:
+    """Compare every function of the user's with itself a turn further, at a few generic points.
+
+    Raises
+    ------
+    ModelError
+        If one differs.
+    """
+    own = [each for each in functions if not is_of_library(each.function)] if np.any(lengths) else []
+    for function in own:
+        for t, x in sample_points(variables.dimension):
+            fault = angle_fault_at(variables, function, t, x, variables.defaults, lengths)
+            if fault is not None:
+                raise ModelError(fault)
 
 
 def sample_state(variables: Variables) -> np.ndarray:

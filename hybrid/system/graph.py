@@ -14,7 +14,7 @@ import numpy as np
 from hybrid import arguments
 from hybrid.display.tables import html_table, table, with_unit
 from hybrid.errors import ModelError, unknown_name
-from hybrid.system.checks import check_functions
+from hybrid.system.checks import check_angles, check_functions
 from hybrid.system.elements import END, Mode, Transition
 from hybrid.system.functions import ModelFunction, functions_in
 from hybrid.system.growth import Growth, grows
@@ -104,9 +104,14 @@ class HybridSystem(Portable):
         Units by name, of components of the state, of parameters, and of time under the name ``"t"``; any may
         be left out. Results as datasets and pictures show them, and `hybrid.testing` checks that functions
         fit them; no run uses them.
+    angles
+        Components that are angles, with the length of a turn: ``{"phi": 2 * np.pi}``. A turn further the
+        functions must be the same, which is checked; a reset may add whole turns. Orbits close, and
+        attractors are near, up to whole turns. The state itself is never wrapped.
     laws
         What the author knows of the runs, such as a conserved energy: `Laws`. The checks of
-        `hybrid.testing` use them, and say so if one does not fit the system; no calculation does.
+        `hybrid.testing` use them, and say so if one does not fit the system. `periodic_orbit` holds what is
+        conserved at its value at the guess; no other calculation uses laws.
 
     Raises
     ------
@@ -142,6 +147,7 @@ class HybridSystem(Portable):
     period: Period = attrs.field(default=None, kw_only=True, converter=_as_period)
     start: str | None = attrs.field(default=None, kw_only=True)
     name: str = attrs.field(default="", kw_only=True, validator=_name)
+    angles: Mapping[str, float] = attrs.field(factory=dict, kw_only=True, repr=False)
     # Units decide no result, so systems that differ in them are the same model.
     units: Mapping[str, str] = attrs.field(factory=dict, kw_only=True, eq=False, repr=False)
     # Nor do laws.
@@ -160,7 +166,10 @@ class HybridSystem(Portable):
     def __attrs_post_init__(self) -> None:
         object.__setattr__(self, "units", self.variables.as_units(self.units))
         self._check_graph()
-        check_functions(self.variables, self._unchecked(), self.period)
+        object.__setattr__(self, "angles", self.variables.as_angles(self.angles))
+        unchecked = self._unchecked()
+        check_functions(self.variables, unchecked, self.period)
+        check_angles(self.variables, unchecked, self.turn_lengths)
 
     @property
     def is_whole(self) -> bool:
@@ -205,6 +214,9 @@ class HybridSystem(Portable):
             lines.insert(2, f"time: {with_unit('t', units['t'])}")
         if self.start is not None:
             lines.append(f"start: {self.start!r}")
+        if self.angles:
+            turns = ", ".join(f"{name} turns in {turn:.6g}" for name, turn in self.angles.items())
+            lines.append(f"angles: {turns}")
         if self.period is not None:
             lines.append(f"period: {self._period_told()}")
         if self.switching:
@@ -258,6 +270,13 @@ class HybridSystem(Portable):
     def dimension(self) -> int:
         """Number of state components ``n``."""
         return self.variables.dimension
+
+    @cached_property
+    def turn_lengths(self) -> np.ndarray:
+        """Length of a turn of each component ``(n,)``, 0 for one that is no angle; read-only."""
+        lengths = np.array([self.angles.get(name, 0.0) for name in self.state_names])
+        lengths.flags.writeable = False
+        return lengths
 
     @property
     def state_names(self) -> tuple[str, ...]:

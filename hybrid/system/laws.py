@@ -136,7 +136,8 @@ class Laws(Portable):
         of drawn runs lie there. They find a mode that drifts off its surface, and a reset that misses it.
     conserved
         Quantities that never change, such as an energy. They find a force with a wrong sign or factor, a
-        component that a reset forgets, a loss where none is meant.
+        component that a reset forgets, a loss where none is meant. `hybrid.periodic_orbit` holds them at
+        their values at the guess.
     dissipated
         Quantities that never grow; or pairs ``(quantity, power)``: it grows by no more than the integral of
         the power put in. They find friction that drives, a restitution above one, an impulse of the wrong

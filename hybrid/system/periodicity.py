@@ -1,10 +1,11 @@
-"""Check that a declared forcing period is a period of the model functions."""
+"""Check that the forcing period and the turns of angles are periods of the model functions."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from typing import Any
 
+import attrs
 import numpy as np
 
 from hybrid import arguments
@@ -61,7 +62,7 @@ def period_fault(
     return None
 
 
-def _rounding(
+def rounding(
     variables: Variables,
     function: ModelFunction,
     t: float,
@@ -80,29 +81,93 @@ def _rounding(
     return 16.0 * largest
 
 
+@attrs.frozen(eq=False)
+class Shift:
+    """A change of the time and of the state that no function may see.
+
+    ``lengths (n,)`` are those of a turn: a reset may differ by whole turns.
+    """
+
+    t: float
+    x: np.ndarray
+    lengths: np.ndarray
+
+    def apart(self, function: ModelFunction, here: np.ndarray, there: np.ndarray) -> np.ndarray:
+        """How far two values of a function are apart."""
+        change = there - here
+        if function.completed is not None:
+            change = closed_change(change, self.lengths)
+        return np.abs(change)
+
+
+def whole_turns(change: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Whole turns ``(..., n)`` in changes of the state; 0 for components whose length is 0: no angles."""
+    turns = np.divide(change, lengths, out=np.zeros(np.shape(change)), where=lengths > 0.0)
+    return np.asarray(np.round(turns))
+
+
+def closed_change(change: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Changes of the state ``(..., n)`` without whole turns of its angles."""
+    return np.asarray(change - lengths * whole_turns(change, lengths))
+
+
+def _fault(
+    variables: Variables, function: ModelFunction, t: float, x: np.ndarray, values: np.ndarray, shift: Shift
+) -> tuple[float, float] | None:
+    """Two values that differ after a shift by more than rounding, if there are any."""
+    here = evaluate(variables, function.value, t, x, values)
+    there = evaluate(variables, function.value, t + shift.t, x + shift.x, values)
+    if here is None or there is None:
+        return None
+    apart = shift.apart(function, here, there)
+    if np.all(apart <= 16 * EPSILON * np.abs(here)):
+        return None
+    band = 64 * EPSILON * np.maximum(np.abs(here), np.abs(there))
+    for share in (1.0 - LOOSE, 1.0 + LOOSE):
+        near = evaluate(variables, function.value, t + share * shift.t, x + share * shift.x, values)
+        if near is None:
+            return None
+        band = band + 2.0 * shift.apart(function, there, near)
+    wrong = apart > band + rounding(variables, function, t, x, values, here)
+    if not np.any(wrong):
+        return None
+    i = int(np.argmax(wrong))
+    return float(here[i]), float(there[i])
+
+
 def period_fault_at(
     variables: Variables, function: ModelFunction, t: float, x: np.ndarray, values: np.ndarray, period: float
 ) -> str | None:
     """Error text if a function differs one period later by more than rounding, else None."""
-    here = evaluate(variables, function.value, t, x, values)
-    there = evaluate(variables, function.value, t + period, x, values)
-    if here is None or there is None:
+    still = np.zeros(len(x))
+    found = _fault(variables, function, t, x, values, Shift(period, still, still))
+    if found is None:
         return None
-    apart = np.abs(there - here)
-    if np.all(apart <= 16 * EPSILON * np.abs(here)):
-        return None
-    band = 64 * EPSILON * np.abs(here)
-    for shift in (1.0 - LOOSE, 1.0 + LOOSE):
-        near = evaluate(variables, function.value, t + shift * period, x, values)
-        if near is None:
-            return None
-        band = band + 2.0 * np.abs(near - there)
-    wrong = apart > band + _rounding(variables, function, t, x, values, here)
-    if not np.any(wrong):
-        return None
-    i = int(np.argmax(wrong))
+    here, there = found
     return (
         f"HybridSystem: period = {period:.10g} is not a period of the functions. {function.title} is "
-        f"{here[i]:.10g} {variables.described(t, x, values)}, and {there[i]:.10g} one period later. Give the "
+        f"{here:.10g} {variables.described(t, x, values)}, and {there:.10g} one period later. Give the "
         "period as a function of the parameters, for example period=lambda p: 2*np.pi/p.omega, or omit it."
     )
+
+
+def angle_fault_at(
+    variables: Variables,
+    function: ModelFunction,
+    t: float,
+    x: np.ndarray,
+    values: np.ndarray,
+    lengths: np.ndarray,
+) -> str | None:
+    """Error text if a function differs by more than rounding a turn of an angle further, else None."""
+    for i in np.flatnonzero(lengths):
+        turn = lengths * (np.arange(len(lengths)) == i)
+        found = _fault(variables, function, t, x, values, Shift(0.0, turn, lengths))
+        if found is not None:
+            name, (here, there) = variables.state_names[i], found
+            return (
+                f"HybridSystem: angles: {name!r} is no angle with a turn of {lengths[i]:.10g}. "
+                f"{function.title} is {here:.10g} {variables.described(t, x, values)}, and {there:.10g} a "
+                "turn further. Correct the length of the turn, or leave the component out of angles=."
+            )
+    return None

@@ -137,6 +137,14 @@ class Variables:
             arguments.instance(f"HybridSystem: units[{name!r}]", unit, str)
         return FrozenMapping(given)
 
+    def as_angles(self, value: object) -> Mapping[str, float]:
+        """Lengths of a turn by name of a component, read-only."""
+        given = named("HybridSystem: angles", value, "map names of the state to lengths of a turn")
+        for name, turn in given.items():
+            arguments.known("HybridSystem: angles: State component", name, self.state_names, STATE)
+            given[name] = arguments.positive(f"HybridSystem: angles[{name!r}]", turn)
+        return FrozenMapping(given)
+
     def state_values(self, name: str, value: object) -> np.ndarray:
         """A finite state ``(n,)`` from the argument ``name``: numbers in order, or with names as labels.
 

@@ -14,7 +14,7 @@ from hybrid.testing.engine import Engine
 from hybrid.testing.errors import PropertyError, discard
 from hybrid.testing.events import check_jumps, check_sides
 from hybrid.testing.fields import PiecewiseAffineField, piecewise_affine_fields
-from hybrid.testing.functions import check_compiled, check_period
+from hybrid.testing.functions import check_angles, check_compiled, check_period
 from hybrid.testing.invariance import (
     check_cut,
     check_elastic,
@@ -48,6 +48,7 @@ __all__ = [
     "Run",
     "SystemReport",
     "cases",
+    "check_angles",
     "check_compiled",
     "check_continuity",
     "check_crossings",

@@ -30,9 +30,11 @@ from hybrid.testing.engine import LIBRARY, Engine
 from hybrid.testing.errors import PropertyError
 from hybrid.testing.events import JUMPS, SIDES, check_jumps, check_sides
 from hybrid.testing.functions import (
+    ANGLES,
     COMPILED,
     PERIOD,
     SHORTEST,
+    check_angles,
     check_compiled,
     check_period,
     check_shortest_period,
@@ -74,7 +76,7 @@ from hybrid.testing.strategies import Ranges, all_laws, cases
 from hybrid.testing.units import UNITS, check_units
 
 # Properties of the functions, at the start of a case, and of the whole run; laws are others.
-WITHOUT_RUN = (DERIVATIVES, COMPILED, PERIOD, SIDES_AFTER, LIMITS, ENDS)
+WITHOUT_RUN = (DERIVATIVES, COMPILED, PERIOD, ANGLES, SIDES_AFTER, LIMITS, ENDS)
 
 
 def check_system(
@@ -201,6 +203,7 @@ def _properties(
         DERIVATIVES: check_derivatives,
         COMPILED: check_compiled,
         PERIOD: check_period,
+        ANGLES: check_angles,
         SIDES_AFTER: check_sides_after,
         LIMITS: check_limits,
         **law_checks(laws),
@@ -224,6 +227,7 @@ def _properties(
     }
     applies = {
         PERIOD: system.period is not None,
+        ANGLES: bool(system.angles),
         LANDINGS: any(each.reset is not None for each in system.transitions),
         LIMITS: any(each.accumulates_to for each in system.transitions),
         ORDER: len(system.transitions) > 1,

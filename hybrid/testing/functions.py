@@ -13,12 +13,13 @@ from hybrid.compiler.compiled import compile_system
 from hybrid.symbolic.reads import TIME, names_read
 from hybrid.symbolic.values import TraceError
 from hybrid.system.graph import HybridSystem, functions_of
-from hybrid.system.periodicity import period_at, period_fault_at
+from hybrid.system.periodicity import angle_fault_at, period_at, period_fault_at
 from hybrid.system.watched import is_of_library
 from hybrid.testing.case import Case, as_case
 from hybrid.testing.errors import PropertyError, discard
 
 COMPILED = "The compiled functions equal the Python functions"
+ANGLES = "A turn of an angle changes no function"
 PERIOD = "The declared period is a period of every function"
 SHORTEST = "No part of the declared period is a period of every function"
 # Parts of the period, numbers of cases and of phases at which they are tried.
@@ -93,6 +94,28 @@ def check_period(case: Case) -> None:
                 hint="a number in the period where a function has a parameter, or time that enters a "
                 "function outside its forcing.",
             )
+
+
+def check_angles(case: Case) -> None:
+    """Every function has the same values a turn of an angle further, at the start of the case.
+
+    A reset may add whole turns.
+
+    Raises
+    ------
+    PropertyError
+        If a value differs.
+    """
+    as_case(case)
+    system, x = case.system, np.array(case.x0)
+    if not system.angles:
+        discard("no angle is declared")
+    for _, function in functions_of(system):
+        if is_of_library(function.function):
+            continue
+        fault = angle_fault_at(system.variables, function, case.t0, x, case.values, system.turn_lengths)
+        if fault is not None:
+            case.fail(ANGLES, fault, hint="an angle outside of sine and cosine, or a turn of another length.")
 
 
 def check_shortest_period(system: HybridSystem, cases: Sequence[Case]) -> None:

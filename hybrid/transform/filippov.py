@@ -24,6 +24,7 @@ def filippov(
     period: float | Function | None = None,
     name: str = "",
     units: Mapping[str, str] | None = None,
+    angles: Mapping[str, float] | None = None,
     laws: Laws | None = None,
 ) -> HybridSystem:
     """The Filippov system ``f_b`` where ``h < 0``, ``f_a`` where ``h > 0``, with its sliding mode derived.
@@ -55,7 +56,7 @@ def filippov(
     switching
         Scalar function ``h(t, x, p)``, which must be traceable. Its gradient must not vanish where ``h = 0``.
         The sliding mode needs ``h`` to be twice differentiable.
-    start, period, name, units, laws
+    start, period, name, units, angles, laws
         As for `HybridSystem`.
 
     Returns
@@ -143,6 +144,7 @@ def filippov(
         period=period,
         name=name,
         units={} if units is None else units,
+        angles={} if angles is None else angles,
         laws=Laws() if laws is None else laws,
         derived_from=Watched([below, above, switching]),
     )

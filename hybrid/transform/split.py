@@ -18,6 +18,7 @@ def from_equations(
     period: Period = None,
     name: str = "",
     units: Mapping[str, str] | None = None,
+    angles: Mapping[str, float] | None = None,
     laws: Laws | None = None,
 ) -> HybridSystem:
     """The hybrid system of one right-hand side with ``np.sign``, ``np.abs``, ``np.where`` and the like.
@@ -28,7 +29,7 @@ def from_equations(
     ----------
     field
         ``f(t, x, p)``, which returns the ``n`` derivatives. It must be traceable.
-    state, parameters, period, name, units, laws
+    state, parameters, period, name, units, angles, laws
         As for `HybridSystem`.
 
     Raises
@@ -59,6 +60,7 @@ def from_equations(
             period=period,
             name=name,
             units={} if units is None else units,
+            angles={} if angles is None else angles,
             laws=Laws() if laws is None else laws,
         )
     )

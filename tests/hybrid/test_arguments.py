@@ -62,6 +62,7 @@ def made():
         "fractions": hybrid.basin_fractions(OSCILLATOR, {"x": (-1.0, 0.0), "v": 0.0}, starts=3),
         "two": lyapunov.two_orbit_exponents(OSCILLATOR, (0.0, 0.0), intervals=5),
         "spectrum": lyapunov.lyapunov_spectrum(OSCILLATOR, (0.0, 0.0), intervals=5),
+        "impacts": lyapunov.lyapunov_spectrum(models.impact_oscillator(), (0.9, 1.0), intervals=5),
     }
 
 

@@ -83,7 +83,7 @@ def task(y, rates, tangents=0, steps=0):
         y=np.array(y, dtype=float), rates=np.array(rates, dtype=float), time=0.0, steps=steps,
         side=np.zeros(1, dtype=int), on_guard=np.zeros(1, dtype=int), due=np.zeros(1, dtype=int),
         growth=np.full(tangents, 99.0), divergence=99.0, log_determinant=99.0,
-        indistinct=0, strain=5.0, stage=READY, mode=0, **{"previous_mode": 1},
+        indistinct=0, strain=5.0, stage=READY, mode=0, jumps=0, **{"previous_mode": 1},
     )  # fmt: skip
     model = SimpleNamespace(period=2.0, dimension=n)
     work = SimpleNamespace(jacobian=np.zeros((max(tangents, 1), max(n, 1))))
@@ -92,6 +92,10 @@ def task(y, rates, tangents=0, steps=0):
 
 def new_end():
     return End(counters=np.array([0, 0]), numbers=np.array([0.0]))
+
+
+# Counts of the jumps of no transition.
+NONE = np.zeros(0, dtype=np.int64)
 
 
 class Advance:
@@ -124,7 +128,7 @@ class TestGrowthRates:
         ours.run.stage = stage
         end, rates = new_end(), np.full((rows, 3), -7.0)
         batches, state = new_batches(3)
-        code = plain.growth_rates(advance, None, ours, end, 1.5, 123, resumed, rates, batches, state)
+        code = plain.growth_rates(advance, None, ours, end, 1.5, 123, resumed, rates, NONE, batches, state)
         return code, ours, end, rates, (batches, state)
 
     def test_rates_are_growth_over_the_interval(self, plain):
@@ -136,7 +140,7 @@ class TestGrowthRates:
         np.testing.assert_array_equal(batches[:3], rates)
         assert state.tolist() == [3, 1, 0]
         assert (end.done, end.cycle, end.phase) == (3, 2, 0.5)
-        assert [call[1:] for call in advance.calls] == [(t, 123, 2**63 - 1) for t in (1.5, 3.0, 4.5)]
+        assert [call[1:] for call in advance.calls] == [(t, 123, 0) for t in (1.5, 3.0, 4.5)]
         np.testing.assert_array_equal(ours.run.y, [1.0, 1.0, 1.0, 0.0, 0.0, 1.0])
         assert (ours.run.strain, ours.run.indistinct) == (0.0, 0)
 
@@ -154,7 +158,7 @@ class TestGrowthRates:
         ours.run.divergence, ours.run.log_determinant = 1.0, 2.0
         batches = new_batches(3)
         rates = np.zeros((2, 3))
-        code = plain.growth_rates(Advance(), None, ours, end, 1.5, 123, True, rates, *batches)
+        code = plain.growth_rates(Advance(), None, ours, end, 1.5, 123, True, rates, NONE, *batches)
         assert (code, end.done, end.cycle, end.phase) == (DONE, 2, 2, 0.5)
         grown = [3.0 / 1.5 + 0.5, 6.0 / 1.5 - 1.25, (1.0 + 2.0 - 0.1) / 1.5 + 0.3]
         np.testing.assert_allclose(rates, [grown, [0.5, -1.25, 0.3 - 0.1 / 1.5]], rtol=1e-14)
@@ -164,7 +168,7 @@ class TestGrowthRates:
         ours = task([1.0, 1.0, 1.0, 0.0, 0.0, 1.0], np.zeros(6), tangents=2)
         ours.work.jacobian[:] = 1e30
         rates = np.zeros((1, 3))
-        plain.growth_rates(Advance(), None, ours, new_end(), 1.5, 9, False, rates, *new_batches(3))
+        plain.growth_rates(Advance(), None, ours, new_end(), 1.5, 9, False, rates, NONE, *new_batches(3))
         assert rates[0, :2].tolist() == [0.0, 0.0]
 
     def test_vectors_of_which_only_rounding_is_left_are_counted(self, plain, monkeypatch):

@@ -26,6 +26,7 @@ class Burst(Estimate):
         self.made, self.last, self.calls, self.done, self.told = [*made], last, [], 0, []
         self.end = SimpleNamespace(done=99)
         self.interval, self.grazed_growth = 2.0, growth
+        self.hits = np.zeros(0, dtype=np.int64)
 
     def _rates(self, most, resumed, rates, batches):
         assert (most, batches) == (22, "batches")
@@ -196,7 +197,7 @@ def test_what_happens_in_the_transient_does_not_count(transient, failing, monkey
         jumps=0,
         mode="a",
         x=np.array([9.0]),
-        system=SimpleNamespace(state_names=("q",), units={"q": "m"}),
+        system=SimpleNamespace(state_names=("q",), units={"q": "m"}, transitions=(), transition_names=()),
     )
     replaced = []
     monkeypatch.setattr(burst, "_replace_annihilated", lambda: replaced.append(run.steps))

@@ -44,7 +44,10 @@ def near(known, y, mode):
             continue
         owner, far = known.owner[i], 0.0
         for c in range(n):
-            far = max(far, abs(y[c] - points[i, c]) / known.radius[owner, c])
+            apart = abs(y[c] - points[i, c])
+            if known.turns[c] > 0.0:
+                apart = abs(apart - known.turns[c] * round(apart / known.turns[c]))
+            far = max(far, apart / known.radius[owner, c])
         if far <= closest:
             found, closest = owner, far
     return found

@@ -9,13 +9,15 @@ class Known(Structure):
 
     ``points (P, n)`` belong to the attractors ``owner (P,)``, counted from 0, and to the modes ``mode (P,)``.
     A state is near a point of attractor ``a`` if no component is farther than ``radius[a]``, of shape
-    ``(A, n)``; ``widest`` is the largest radius along the axis.
+    ``(A, n)``; ``widest`` is the largest radius along the axis. ``turns (n,)`` are the lengths of a turn of
+    angles, 0 for other components: angles are near up to whole turns.
     """
 
     points: MATRIX
     owner: INDICES
     mode: INDICES
     radius: MATRIX
+    turns: VECTOR
     axis: INTEGER
     widest: REAL
 

@@ -14,6 +14,7 @@ from hybrid.orbits.continuation.place import Place, moment, place_on, share_of
 from hybrid.orbits.continuation.result import Points, mode_at, orbit_of
 from hybrid.orbits.continuation.walk import Event, walk
 from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.orbits.sensitivity import is_isolated
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import Solver, Taylor
@@ -32,6 +33,11 @@ ENDS = {
     "most": "the limit of steps",
     "lost": "Newton's method finds no orbit farther on",
 }
+
+MANY = (
+    "There are other orbits beside each: the one that is nearest to the orbit before is taken, and no "
+    "conserved quantity is held."
+)
 
 
 def continue_orbit(
@@ -104,16 +110,19 @@ def continue_orbit(
     progress = None if progress is None else arguments.flag("progress", progress)
     method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
     with CTRL_C, progress_bar(None, "Branch", progress, "orbit") as bar:
-        found, why = _branch(orbit, parameter, low, high, method, most, bar)
+        found, why, isolated = _branch(orbit, parameter, low, high, method, most, bar)
         if CTRL_C.is_set():
             return attrs.evolve(found, status=interrupted_status("the orbits so far"))
-    return attrs.evolve(found, status=_status(why))
+    status = _status(why)
+    if not isolated:
+        status = attrs.evolve(status, message=f"{status.message} {MANY}")
+    return attrs.evolve(found, status=status)
 
 
 def _branch(
     orbit: PeriodicOrbit, name: str, low: float, high: float, solver: Solver, most: int, bar: Progress
-) -> tuple[Branch, list[str]]:
-    """The branch both ways, and why it ends at either end."""
+) -> tuple[Branch, list[str], bool]:
+    """The branch both ways, why it ends at either end, and whether its first orbit is isolated."""
     begin = place_on(orbit, (name,), np.array([high - low]), solver)
     points = points_of(orbit, begin)
     items: list[Item] = [begin]
@@ -123,7 +132,7 @@ def _branch(
         why.append(_walked(attrs.evolve(begin, tangents=sign * begin.tangents), low, high, most, items, bar))
         if why[-1] in ("closed", "interrupted"):
             break
-    return branch_of(items, points), why
+    return branch_of(items, points), why, is_isolated(begin)
 
 
 def _walked(begin: Place, low: float, high: float, most: int, items: list[Item], bar: Progress) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from hybrid.orbits.continuation.route import Loop
 from hybrid.orbits.periodic_schur import product_eigenvalues
 from hybrid.simulation.arc import HybridArc
+from hybrid.system.periodicity import closed_change
 
 # The gap of each equation counts as closed at this share of the sizes.
 CLOSED = 1e-10
@@ -88,8 +89,12 @@ class Pass:
 
     @cached_property
     def scale(self) -> np.ndarray:
-        """Sizes ``(n,)`` of the components along the orbit, or along the first one if these are larger."""
-        sizes = np.maximum(self.own_scale, self.family.least)
+        """Sizes ``(n,)`` of the components along the orbit, or along the first one if these are larger.
+
+        The size of an angle, which may count many turns, is its turn.
+        """
+        sizes, turns = np.maximum(self.own_scale, self.family.least), self.family.system.turn_lengths
+        sizes = np.where(turns > 0.0, turns, sizes)
         return np.where(sizes > 0.0, sizes, 1.0)
 
     @cached_property
@@ -120,6 +125,13 @@ class Pass:
     @property
     def _span(self) -> float:
         return abs(self.loop.period) or 1.0
+
+    @property
+    def change(self) -> np.ndarray:
+        """Change ``(n,)`` of the state over the period: whole turns of angles, and zero but for errors."""
+        pairs = zip(self.flows, self.landings, strict=True)
+        ends = [flow.end if landing is None else landing.after for flow, landing in pairs]
+        return np.asarray(np.sum(np.array(ends) - np.roll(self.loop.x, -1, axis=0), axis=0))
 
     @cached_property
     def saltations(self) -> list[np.ndarray]:
@@ -237,7 +249,9 @@ class Pass:
                 row[first + i + 1] += landing.gradient[-1]
                 matrix[first + i], values[first + i] = row, landing.height
             matrix[rows, after] -= np.eye(n)
-            values[rows] -= self.loop.x[(i + 1) % count]
+            values[rows] = closed_change(
+                values[rows] - self.loop.x[(i + 1) % count], self.family.system.turn_lengths
+            )
         self._close(anchor, matrix[-1], values, first)
         matrix *= units
         sizes = np.concatenate([np.tile(anchor.scale, count), np.abs(matrix[first:]).max(axis=1)])

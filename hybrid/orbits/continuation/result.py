@@ -8,7 +8,7 @@ import numpy as np
 from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import moment, share_of
 from hybrid.orbits.continuation.route import Route
-from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.orbits.orbit import PeriodicOrbit, turns_over
 from hybrid.status import SUCCESS
 
 
@@ -65,6 +65,7 @@ def orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
         ),
         transitions=tuple(fired),
         status=SUCCESS,
+        turns=turns_over(family.system, orbit.change),
     )
 
 

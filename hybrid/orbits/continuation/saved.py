@@ -14,11 +14,12 @@ from hybrid import arguments
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
 from hybrid.orbits.continuation.labelled import KIND, SIDES
-from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.orbits.orbit import PeriodicOrbit, turns_over
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Taylor
 from hybrid.status import SUCCESS, Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.periodicity import closed_change
 
 if TYPE_CHECKING:
     import xarray
@@ -137,9 +138,10 @@ def _orbit(
         multipliers=multipliers.real if np.all(multipliers.imag == 0.0) else multipliers,
         log_moduli=moduli,
         fundamental=arc.fundamental,
-        residual=float(np.linalg.norm(arc.x[-1] - x0)),
+        residual=float(np.linalg.norm(closed_change(arc.x[-1] - x0, system.turn_lengths))),
         iterations=0,
         signature=(mode, *(str(jump.target) for jump in arc.jumps)),
         transitions=tuple(map(str, arc.jumps.transition)),
         status=SUCCESS,
+        turns=turns_over(system, arc.x[-1] - x0),
     )

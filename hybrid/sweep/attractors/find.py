@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import attrs
 import numpy as np
@@ -19,6 +20,7 @@ from hybrid.sweep.attractors.attractor import UNKNOWN, Attractor
 from hybrid.sweep.attractors.runs import Points
 from hybrid.sweep.attractors.setup import Setup
 from hybrid.system.elements import Guard
+from hybrid.system.periodicity import closed_change
 from hybrid.transform.markers import with_section
 
 # Points in which a period is looked for, and after how many without one an attractor has none.
@@ -31,22 +33,34 @@ INTERVALS, MOST_INTERVALS, LOOKED_AT = 400, 1600, 16
 
 @attrs.frozen(eq=False)
 class Found:
-    """An attractor with what the search needs: how near is near, per component ``(n,)``."""
+    """An attractor with what the search needs: how near is near, per component ``(n,)``.
+
+    ``turns (n,)`` are the lengths of a turn of angles, 0 for other components.
+    """
 
     attractor: Attractor
     radius: np.ndarray
+    turns: np.ndarray
 
-    def distances(self, states: np.ndarray, mode: np.ndarray) -> np.ndarray:
-        """How far states ``(N, n)`` in these modes ``(N,)`` are from the points, in radii."""
+    def tree(self, points: np.ndarray) -> Any:
+        """Points ``(P, n)`` to measure distances from in radii; those of angles are up to whole turns."""
         # SciPy's spatial algorithms take long to import.
         from scipy.spatial import cKDTree
 
+        return cKDTree(self.in_radii(points), boxsize=self.turns / self.radius)
+
+    def in_radii(self, states: np.ndarray) -> np.ndarray:
+        """States ``(N, n)`` in radii, with angles within the first turn."""
+        return within_turns(states, self.turns) / self.radius
+
+    def distances(self, states: np.ndarray, mode: np.ndarray) -> np.ndarray:
+        """How far states ``(N, n)`` in these modes ``(N,)`` are from the points, in radii."""
         far = np.full(len(states), np.inf)
         for name in np.unique(mode):
             own, theirs = self.attractor.mode == name, mode == name
             if own.any():
-                tree = cKDTree(self.attractor.points[own] / self.radius)
-                far[theirs] = tree.query(states[theirs] / self.radius, p=np.inf)[0]
+                tree = self.tree(self.attractor.points[own])
+                far[theirs] = tree.query(self.in_radii(states[theirs]), p=np.inf)[0]
         return far
 
 
@@ -56,15 +70,16 @@ def find(setup: Setup, x0: np.ndarray, mode: str | None) -> Found | None:
     before, _ = _collected(points, setup.periods)
     if points.code != codes.DONE:
         return None
-    extent, share = _extent(np.vstack([x0, before])), math.sqrt(setup.solver.rtol)
+    turns = setup.system.turn_lengths
+    extent, share = _extent(np.vstack([x0, before]), turns), math.sqrt(setup.solver.rtol)
     sample = np.empty((0, len(x0))), np.empty((0, 2), dtype=np.int64)
     # Chaos may be a long transient of a periodic orbit, so it takes many points to call an attractor chaotic.
     while len(sample[0]) < MOST_POINTS:
         window = _collected(points, WINDOW)
         if points.code != codes.DONE:
             return None
-        extent = np.maximum(extent, _extent(window[0]))
-        count = _round(window[0], window[1][:, 0], extent, share)
+        extent = np.maximum(extent, _extent(window[0], turns))
+        count = _round(*window, extent, share, turns)
         if count:
             return _periodic(setup, points, count, extent, x0)
         sample = np.vstack([sample[0], window[0]]), np.vstack([sample[1], window[1]])
@@ -73,27 +88,45 @@ def find(setup: Setup, x0: np.ndarray, mode: str | None) -> Found | None:
 
 def _collected(points: Points, count: int) -> tuple[np.ndarray, np.ndarray]:
     states, places = points.more(count)
+    states = within_turns(states, points.trajectory.system.turn_lengths)
     if points.code != codes.DONE:
         # A run that needs a mode which has not been made yet is repeated.
         status_of(points.trajectory, points.code)
     return states, places
 
 
-def _extent(states: np.ndarray) -> np.ndarray:
-    """Size of what a run visits ``(n,)``; that of the state itself where a component never changes."""
+def within_turns(states: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """States ``(N, n)`` with angles from zero to below a turn."""
+    angles = turns > 0.0
+    if not np.any(angles):
+        return states
+    whole = np.where(angles, turns, 1.0)
+    reduced = np.mod(states, whole)
+    # The rest of a small negative angle is rounded to a whole turn.
+    return np.where(angles, np.where(reduced < whole, reduced, 0.0), states)
+
+
+def _extent(states: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Size of what a run visits ``(n,)``; that of the state itself where a component never changes.
+
+    The size of an angle is its turn.
+    """
     extent, size = np.ptp(states, axis=0), np.abs(states).max(axis=0)
-    return np.where(extent > 0, extent, np.where(size > 0, size, 1.0))
+    return np.where(turns > 0, turns, np.where(extent > 0, extent, np.where(size > 0, size, 1.0)))
 
 
-def _round(states: np.ndarray, mode: np.ndarray, extent: np.ndarray, share: float) -> int:
+def _round(
+    states: np.ndarray, places: np.ndarray, extent: np.ndarray, share: float, turns: np.ndarray
+) -> int:
     """The smallest number of points after which a whole round repeats, up to a share of the extent; or 0."""
-    far = np.abs(states[-1] - states[-2::-1]) / extent
+    mode = places[:, 0]
+    far = np.abs(closed_change(states[-1] - states[-2::-1], turns)) / extent
     back = (far <= share).all(axis=1) & (mode[-2::-1] == mode[-1])
     for count in (np.flatnonzero(back) + 1).tolist():
         if 2 * count > len(states):
             break
         last, earlier = states[-count:], states[-2 * count : -count]
-        if np.all(np.abs(last - earlier) <= share * extent):
+        if np.all(np.abs(closed_change(last - earlier, turns)) <= share * extent):
             return int(count)
     return 0
 
@@ -128,7 +161,7 @@ def _periodic(setup: Setup, points: Points, count: int, extent: np.ndarray, x0: 
     )
     if rests:
         attractor = attrs.evolve(attractor, points=states[-1:], mode=attractor.mode[-1:], round=1)
-    return Found(attractor, setup.tolerance * size)
+    return Found(attractor, setup.tolerance * size, setup.system.turn_lengths)
 
 
 def _orbit(setup: Setup, x: np.ndarray, mode: str, time: float) -> np.ndarray:
@@ -136,7 +169,9 @@ def _orbit(setup: Setup, x: np.ndarray, mode: str, time: float) -> np.ndarray:
     span = (setup.t0, setup.t0 + time)
     arc = simulate(setup.system, x, span, mode=mode, parameters=setup.parameters, solver=setup.solver)
     states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], 64 * LOOKED_AT))])
-    return np.asarray(np.ptp(states, axis=0))
+    turns = setup.system.turn_lengths
+    moved = np.ptp(states, axis=0)
+    return np.asarray(np.where(turns > 0.0, np.minimum(moved, turns), moved))
 
 
 def _log_moduli(setup: Setup, x: np.ndarray, mode: str, period: float) -> np.ndarray:
@@ -178,7 +213,8 @@ def _wandering(
         standard_error=error,
         start=x0,
     )
-    whole = Found(attractor, setup.tolerance * np.where(moved > 0, moved, extent))
+    radius = setup.tolerance * np.where(moved > 0, moved, extent)
+    whole = Found(attractor, radius, setup.system.turn_lengths)
     if attractor.kind == "periodic":
         whole = attrs.evolve(whole, attractor=_closed(setup, attractor, origin, mode))
     return _thinned(whole, more, names[more_places[:, 0]])
@@ -189,15 +225,22 @@ def _closed(setup: Setup, attractor: Attractor, x: np.ndarray, mode: str) -> Att
 
     Points at equal times do not come back. The plane lies through a point, across the speed there.
     """
-    extent = np.maximum(_extent(attractor.points), np.finfo(float).tiny)
+    turns = setup.system.turn_lengths
+    extent = np.maximum(_extent(attractor.points, turns), np.finfo(float).tiny)
     normal = (setup.begin(x, mode).field() / extent / extent).tolist()
-    place = list(enumerate(zip(normal, x.tolist(), strict=True)))
-    plane = Guard(lambda t, x, p: sum(each * (x[i] - at) for i, (each, at) in place), +1)
+    place = list(enumerate(zip(normal, x.tolist(), turns.tolist(), strict=True)))
+
+    def height(i: int, x: Any, at: float, turn: float) -> Any:
+        # Of an angle it is the same a turn further.
+        return np.sin(2.0 * np.pi / turn * (x[i] - at)) * turn / (2.0 * np.pi) if turn else x[i] - at
+
+    plane = Guard(lambda t, x, p: sum(each * height(i, x, *rest) for i, (each, *rest) in place), +1)
     marked = with_section(setup.system, plane)
     crossed = attrs.evolve(setup, section=plane, marked=marked)
     points = Points(crossed, x, mode)
     states, places = _collected(points, WINDOW)
-    count = _round(states, places[:, 0], extent, math.sqrt(setup.solver.rtol)) if len(states) == WINDOW else 0
+    share = math.sqrt(setup.solver.rtol)
+    count = _round(states, places, extent, share, turns) if len(states) == WINDOW else 0
     found = _periodic(crossed, points, count, extent, attractor.start) if count else None
     if found is None:
         return attractor

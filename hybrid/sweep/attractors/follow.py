@@ -61,7 +61,5 @@ def _led_to(search: Search, x0: np.ndarray) -> int:
 
 def _distance(one: Found, other: Found) -> float:
     """Mean distance of the points of an attractor from those of another, in units of its radius."""
-    from scipy.spatial import cKDTree
-
-    tree = cKDTree(other.attractor.points / one.radius)
-    return float(np.mean(tree.query(one.attractor.points / one.radius)[0]))
+    tree = one.tree(other.attractor.points)
+    return float(np.mean(tree.query(one.in_radii(one.attractor.points))[0]))

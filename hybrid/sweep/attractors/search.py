@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import attrs
@@ -122,21 +123,28 @@ def known_of(setup: Setup, found: list[Found]) -> Any:
     n, names = setup.system.dimension, setup.marked.mode_names
     if not found:
         empty, none = np.empty((0, n)), np.empty(0, dtype=np.int64)
-        return kernel_types.Known(points=empty, owner=none, mode=none, radius=empty, axis=0, widest=0.0)
+        turns = np.zeros(n)
+        return kernel_types.Known(
+            points=empty, owner=none, mode=none, radius=empty, turns=turns, axis=0, widest=0.0
+        )
     points = np.vstack([each.attractor.points for each in found])
     owner = np.repeat(np.arange(len(found)), [len(each.attractor.points) for each in found])
     index = {name: i for i, name in enumerate(names)}
     mode = np.array([index[name] for each in found for name in each.attractor.mode.tolist()], dtype=np.int64)
     radius = np.array([each.radius for each in found])
-    axis = int(np.argmax(np.ptp(points, axis=0) / radius.max(axis=0)))
+    # Points are not in order along a circle: if all components are angles, every point is looked at.
+    turns = setup.system.turn_lengths
+    spread = np.where(turns > 0.0, -1.0, np.ptp(points, axis=0) / radius.max(axis=0))
+    axis = int(np.argmax(spread))
     order = np.argsort(points[:, axis], kind="stable")
     return kernel_types.Known(
         points=np.ascontiguousarray(points[order]),
         owner=owner[order],
         mode=mode[order],
         radius=radius,
+        turns=np.array(turns),
         axis=axis,
-        widest=float(radius[:, axis].max()),
+        widest=math.inf if turns[axis] > 0.0 else float(radius[:, axis].max()),
     )
 
 

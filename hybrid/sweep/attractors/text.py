@@ -31,6 +31,7 @@ def _as_json(found: Found) -> dict[str, Any]:
     fields = attrs.asdict(found.attractor)
     return {
         "radius": found.radius.tolist(),
+        "turns": found.turns.tolist(),
         **{
             name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in fields.items()
         },
@@ -42,9 +43,9 @@ def read(text: str) -> dict[str, Any]:
     given = json.loads(text)
     found = []
     for each in given["found"]:
-        radius = np.array(each.pop("radius"))
+        radius, turns = (np.array(each.pop(name)) for name in ("radius", "turns"))
         arrays: dict[str, Any] = {
             name: np.array(value) if isinstance(value, list) else value for name, value in each.items()
         }
-        found.append(Found(Attractor(**arrays), radius))
+        found.append(Found(Attractor(**arrays), radius, turns))
     return {**given, "found": found}

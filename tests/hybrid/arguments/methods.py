@@ -88,6 +88,10 @@ def methods(made):
             {"ax": AXES, "quantity": [None, *NAME], "figsize": FIGSIZE},
         ),
         (call(hybrid.GlobalError.plot, made["error"]), {"ax": AXES, "figsize": FIGSIZE}),
+        (
+            call(lyapunov.LyapunovSpectrum.per, made["impacts"], "impact"),
+            {"transition": [None, *NAME]},
+        ),
         (call(lyapunov.ModelComparison.cost, made["comparison"], "a"), {"name": [None, *NAME]}),
         (call(lyapunov.ModelComparison.distance, made["comparison"], "a"), {"name": [None, *NAME]}),
         *(

@@ -7,6 +7,7 @@ import numpy as np
 import hybrid
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 from tests.hybrid.arguments.values import (
+    ANGLES,
     BALL,
     FLAG,
     FUNCTION,
@@ -40,6 +41,7 @@ def systems():
                 "period": [*LIMIT[1:], math.inf],
                 "name": TEXT,
                 "units": UNITS,
+                "angles": ANGLES,
                 "laws": [*FUNCTION, {}, Odd()],
             },
         ),
@@ -62,6 +64,7 @@ def systems():
                 "period": [*LIMIT[1:], math.inf],
                 "name": TEXT,
                 "units": UNITS,
+                "angles": ANGLES,
                 "laws": [*FUNCTION, {}, Odd()],
             },
         ),
@@ -103,6 +106,7 @@ def systems():
                 "period": [*LIMIT[1:], math.inf],
                 "name": TEXT,
                 "units": UNITS,
+                "angles": ANGLES,
                 "laws": [None, *FUNCTION, {}, Odd()],
                 "notes": [None, "a", 3, [1], [None], Odd()],
                 "growth": [*FUNCTION, {}, HybridSystem, BALL, Odd()],

@@ -110,6 +110,7 @@ TANGENT = [
     np.zeros((2, 2, 2)),
 ]
 NAME = ["nope", 3, 1.5, True, math.nan, [1], np.array(["a", "b"]), Odd()]
+ANGLES = [3, "a", [1.0], {"z": 1.0}, {3: 1.0}, {"q": 0.0}, {"q": -1.0}, {"q": "1"}, {"q": np.inf}]
 UNITS = [[1], "a", 3, {"nope": "m"}, {3: "m"}, {"q": 3}, {"q": None}, Odd()]
 TEXT = [None, 3, True, [1], Odd()]
 SYSTEM = [None, "a", 3, models.bouncing_ball, HybridSystem, [BALL], Odd()]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hybrid import Guard, HybridSystem, Mode, Taylor, Transition
-from hybrid.orbits import periodic_orbit as module
+from hybrid.orbits import shooting as module
 from hybrid.orbits.newton import EPSILON, Newton, Point
 from tests.hybrid.orbits.test_newton import shot
 
@@ -19,12 +19,12 @@ X, CONTRACTION = [1000.0, 1000.0], np.diag([0.5, -0.25])
 
 
 def objection(found, *, free_period=False, moved=None, drifts=False, monkeypatch=None):
-    shooting = module._Shooting(None, None, None, SOLVER)
+    shooting = module.Shooting(None, None, None, SOLVER)
     newton = Newton.begin(found, SOLVER.atol, free_period)
     if moved is not None:
         newton = attrs.evolve(newton, moved=np.array(moved))
     if monkeypatch is not None:
-        monkeypatch.setattr(module._Shooting, "_drifts", lambda *_: drifts)
+        monkeypatch.setattr(module.Shooting, "_drifts", lambda *_: drifts)
     return shooting._objection(found, newton, 3, TOLERANCE)
 
 
@@ -92,8 +92,8 @@ class TestFamilies:
     def test_far_from_the_guess(self, monkeypatch):
         """The first shot was a thousand times smaller than the orbit."""
         found = self.family()
-        shooting = module._Shooting(None, None, None, SOLVER)
-        monkeypatch.setattr(module._Shooting, "_drifts", lambda *_: False)
+        shooting = module.Shooting(None, None, None, SOLVER)
+        monkeypatch.setattr(module.Shooting, "_drifts", lambda *_: False)
         for size, near in ((2.0 / module.FARTHEST * 1.1, True), (2.0 / module.FARTHEST * 0.9, False)):
             newton = attrs.evolve(Newton.begin(found, SOLVER.atol, False), first=np.full(2, size))
             assert (shooting._objection(found, newton, 3, TOLERANCE) is None) == near
@@ -112,7 +112,7 @@ def test_far_along_a_direction_in_which_the_ends_agree_everywhere(share, far):
             gone = share * module.FARTHEST * 1000.0 * np.array(direction)
             moved = attrs.evolve(newton, anchor=found.point.x - gone)
             assert moved.led_astray(found, module.FARTHEST) == said
-            text = module._Shooting(None, None, None, SOLVER)._objection(found, moved, 3, TOLERANCE)
+            text = module.Shooting(None, None, None, SOLVER)._objection(found, moved, 3, TOLERANCE)
             assert (text is not None and text.startswith("it went far along a direction")) == said
 
 
@@ -120,7 +120,7 @@ def test_far_along_a_direction_in_which_the_ends_agree_everywhere(share, far):
 def test_the_guessed_period_is_moved_to_where_the_solution_returns(off):
     """Of a rotation with the period 2 pi, to half the distance between the times that are compared."""
     rotation = HybridSystem(state=("q", "v"), modes=[Mode("run", lambda t, x, p: (x.v, -x.q))])
-    shooting = module._Shooting(rotation, None, None, SOLVER)
+    shooting = module.Shooting(rotation, None, None, SOLVER)
     guess = 2 * np.pi / (1 + off)
     found = shooting._time_of_return(Point(np.array([1.0, 0.5]), 0.7, guess))
     apart = guess * module.PERIOD_OFF / (module.SAMPLES - 1)
@@ -129,7 +129,7 @@ def test_the_guessed_period_is_moved_to_where_the_solution_returns(off):
 
 def test_a_guess_without_a_return_stays():
     line = HybridSystem(state=("q",), modes=[Mode("run", lambda t, x, p: (1.0 + 0.0 * x.q,))])
-    shooting = module._Shooting(line, None, None, SOLVER)
+    shooting = module.Shooting(line, None, None, SOLVER)
     assert shooting._time_of_return(Point(np.array([1.0]), 0.0, 3.0)) == 3.0
 
 
@@ -142,7 +142,7 @@ def test_the_search_starts_at_a_later_point_of_the_guess():
         modes=modes,
         transitions=[Transition("right", "left", across), Transition("left", "right", across)],
     )
-    shooting = module._Shooting(rotation, "right", None, SOLVER)
+    shooting = module.Shooting(rotation, "right", None, SOLVER)
     later, moved = shooting._moved(Point(np.array([1.0, 0.0]), 0.7, 2 * np.pi), np.pi)
     assert later.mode == "left"
     np.testing.assert_allclose(moved.x, [-1.0, 0.0], atol=1e-9)
@@ -161,5 +161,5 @@ def test_the_quietest_time_is_farthest_from_jumps_in_two_periods(jumps, quiet):
         return SimpleNamespace(jumps=SimpleNamespace(t=0.7 + np.array(jumps)))
 
     found = SimpleNamespace(_follow=follow, mode="run")
-    assert module._Shooting._quiet_time(found, Point(np.zeros(1), 0.7, 10.0)) == pytest.approx(quiet)
+    assert module.Shooting._quiet_time(found, Point(np.zeros(1), 0.7, 10.0)) == pytest.approx(quiet)
     assert asked == [20.0]

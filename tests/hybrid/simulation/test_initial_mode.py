@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hybrid import ArgumentError
+from hybrid import ArgumentError, Guard, HybridSystem, Mode, Reset, Transition, from_equations, simulate
 from hybrid.kernels.types.codes import BEYOND, LEAVES, NO_TRANSITION
 from hybrid.simulation import initial_mode
 from hybrid.simulation.initial_mode import choose_mode
@@ -31,6 +31,7 @@ def choose(monkeypatch):
                     found[index] = verdicts[name]
             return NO_TRANSITION
 
+        monkeypatch.setattr(initial_mode, "move_alike", lambda *_: False)
         monkeypatch.setattr(initial_mode, "load_kernels", lambda name: SimpleNamespace(try_modes=try_modes))
         system = SimpleNamespace(
             mode_names=modes,
@@ -122,3 +123,71 @@ def test_where_no_part_allows_the_state_a_mode_along_the_last_surface_is_made(ch
     with pytest.raises(Unexplored, match=made[0]):
         choose({"up": BEYOND, "down": BEYOND}, "m", SPLIT, ("m, q<0", "m, q>0", "c"), growth)
     assert found == made
+
+
+def sides(left, right, reset=None):
+    """Two modes on the sides of ``q = 0``."""
+    return HybridSystem(
+        state=("q", "v"),
+        modes=[Mode("left", left), Mode("right", right)],
+        transitions=[
+            Transition("left", "right", Guard(lambda t, x, p: x.q, direction=+1), reset),
+            Transition("right", "left", Guard(lambda t, x, p: x.q, direction=-1)),
+        ],
+    )
+
+
+def soft(t, x, p):
+    return x.v, -x.q
+
+
+def stiff(t, x, p):
+    return x.v, -4.0 * x.q
+
+
+class TestOnAKink:
+    """Both modes allow a start that does not leave the guard at once."""
+
+    def test_at_rest_on_a_continuous_kink_either_mode_is_right(self):
+        arc = simulate(sides(soft, stiff), (0.0, 0.0), (0.0, 1.0))
+        assert arc.status.ok
+        assert arc.x[-1].tolist() == [0.0, 0.0]
+
+    def test_a_start_in_equations_with_a_kink(self):
+        arc = simulate(
+            from_equations(lambda t, x, p: (x.v, -np.abs(x.q)), state=("q", "v")), (0.0, 0.0), (0.0, 1.0)
+        )
+        assert arc.x[-1].tolist() == [0.0, 0.0]
+
+    @pytest.mark.parametrize("sign", [-1.0, 1.0])
+    def test_a_flow_that_leaves_by_a_high_derivative_goes_to_its_side(self, sign):
+        """From rest ``q = sign t^5 / 20`` at first: with ``sign t^3`` as the force."""
+
+        def field(stiffness):
+            return lambda t, x, p: (x.v, sign * t**3 - stiffness * x.q)
+
+        arc = simulate(sides(field(1.0), field(4.0)), (0.0, 0.0), (0.0, 1.0))
+        assert str(arc.mode[-1]) == ("right" if sign > 0 else "left")
+        # The solution of q'' = sign t^3 - k q with k = w^2 from rest.
+        w = 2.0 if sign > 0 else 1.0
+        exact = sign * (1.0 - 6.0 / w**2 + 6.0 * np.sin(w) / w**3) / w**2
+        assert arc.x[-1, 0] == pytest.approx(exact, rel=1e-9)
+
+    def test_fields_that_agree_at_the_start_alone_are_refused(self):
+        """On the guard they differ elsewhere: each leads to its own side, by a third derivative."""
+
+        def field(sign):
+            return lambda t, x, p: (sign * x.v**2, 1.0)
+
+        with pytest.raises(ArgumentError, match="allowed in more than one mode: left, right"):
+            simulate(sides(field(-1.0), field(1.0)), (0.0, 0.0), (0.0, 1.0))
+
+    def test_fields_that_differ_on_the_guard_are_refused(self):
+        apart = sides(lambda t, x, p: (0.0, 1.0), lambda t, x, p: (0.0, 2.0))
+        with pytest.raises(ArgumentError, match="allowed in more than one mode: left, right"):
+            simulate(apart, (0.0, 0.0), (0.0, 1.0))
+
+    def test_modes_that_a_reset_joins_are_refused(self):
+        system = sides(soft, stiff, Reset(lambda t, x, p: {"v": 2.0 * x.v}))
+        with pytest.raises(ArgumentError, match="allowed in more than one mode: left, right"):
+            simulate(system, (0.0, 0.0), (0.0, 1.0))

@@ -101,9 +101,9 @@ def test_how_far_rounding_moves_a_function():
         return (x.q + 1e6) - 1e6, p.w
 
     here = np.array([0.5, 2.0])
-    found = periodicity._rounding(VARIABLES, function(value), 0.3, X, VALUES, here)
+    found = periodicity.rounding(VARIABLES, function(value), 0.3, X, VALUES, here)
     # The first loses up to half of the last place of 1e6; the second moves by two last places at most.
     assert 0.0 <= found[0] < 1e-8
     assert 0.0 < found[1] <= 16 * 4 * periodicity.EPSILON
-    nothing = periodicity._rounding(VARIABLES, function(lambda t, x, p: (np.nan, 1.0)), 0.3, X, VALUES, here)
+    nothing = periodicity.rounding(VARIABLES, function(lambda t, x, p: (np.nan, 1.0)), 0.3, X, VALUES, here)
     assert nothing.tolist() == [0.0, 0.0]

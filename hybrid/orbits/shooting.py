@@ -1,0 +1,426 @@
+"""The search for a periodic orbit from a guess: shots over the period, Newton's steps, and the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import attrs
+import numpy as np
+
+from hybrid.errors import ArgumentError
+from hybrid.orbits.closing import advance_to_close, same_time
+from hybrid.orbits.factors import fundamental_eigenvalues
+from hybrid.orbits.held import Held, held_by
+from hybrid.orbits.newton import ROUNDING_OF_GAP, Newton, Point, Shot, length
+from hybrid.orbits.orbit import PeriodicOrbit, turns_over
+from hybrid.orbits.periodic_schur import ProductEigenvalues
+from hybrid.orbits.rest import EPSILON, drift
+from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.ending import status_of
+from hybrid.simulation.jumps import Jump
+from hybrid.simulation.periods import split_time
+from hybrid.simulation.simulate import simulate
+from hybrid.simulation.trajectory import Trajectory, start
+from hybrid.solvers import Solver
+from hybrid.status import Status, StatusCode, noting
+from hybrid.system.graph import HybridSystem, functions_of
+from hybrid.system.periodicity import angle_fault_at, closed_change
+
+# Points, besides the solver's own, that show how far an orbit moves.
+SAMPLES = 65
+# The smallest gap that Newton's method can reach, in units in the last place of the largest states.
+FINEST_GAP = 4
+# Newton steps are halved at most to this share.
+SHORTEST_STEP = 1 / 64
+# A period below this share of the guess is a point, not an orbit.
+SHORTEST_PERIOD = 1e-3
+# Most jumps of the guess that are examined to find a point away from jumps.
+MOST_JUMPS_LOOKED_AT = 10_000
+# An autonomous orbit moves by more than this many times the accepted rounding.
+LEAST_MOTION = 1e3
+# Share of its states by which a point that hardly moves may still be wrong.
+POINT_ERROR = 1e-8
+# Where Newton's method cannot tell which of many orbits it is at, that is one only if it closes up to this
+# share of its motion, is at most so many times larger than the solution through the guess, and the last step
+# moved it by less than a share of its motion.
+DRIFT = 1e-3
+FARTHEST = 1e3
+SETTLED = 0.1
+# And it closes better the tighter the tolerances are: by this factor, where they are tighter by its square.
+TIGHTER = 10.0
+# The guess of a period is changed by this share at most, if the solution then returns that much nearer.
+PERIOD_OFF = 0.1
+NEARER = 0.5
+# Directions in which the matrix of Newton's method is smaller than this share of its size may be those of a
+# family of orbits.
+NEARLY_SINGULAR = 1e-5
+# A multiplier may be 1 if it is this near: of a double one that is the root of its error.
+NEAR_ONE = 1e-3
+# The turn of an angle that is not declared.
+TURN = 2.0 * np.pi
+FAMILY = "The orbit is one of a family"
+HOLD_IT = (
+    "If the system conserves a quantity, declare it with HybridSystem(laws=Laws(conserved=...)): the search "
+    "then holds the value that it has at the guess."
+)
+
+
+@attrs.frozen(eq=False)
+class Shooting:
+    """Searches for orbits of one system, with the conserved quantities that are held."""
+
+    system: HybridSystem
+    mode: str | None
+    parameters: Mapping[str, float] | None
+    solver: Solver
+    held: Held | None = None
+
+    def shoot(self, point: Point) -> Shot:
+        """One run over the period of a point, with the columns of the identity."""
+        trajectory = self._trajectory(point, self.mode)
+        mode, field = trajectory.mode, trajectory.field()
+        code = advance_to_close(trajectory, *split_time(point.t + point.period, trajectory.model.period))
+        arc = self._follow(point, point.period, mode)
+        states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], SAMPLES))])
+        extent, magnitude = np.ptp(states, axis=0), np.abs(states).max(axis=0)
+        at_rest, carried = extent <= ROUNDING_OF_GAP * EPSILON * magnitude, None
+        if np.any(at_rest) and code == StatusCode.SUCCESS and len(arc.jumps) <= MOST_JUMPS_LOOKED_AT:
+            again, end = self._trajectory(point, self.mode), point.t + point.period
+            carried = drift(again, end, arc.jumps.t, at_rest, magnitude)
+        return Shot(
+            point,
+            mode,
+            trajectory.x,
+            trajectory.mode,
+            trajectory.tangent_matrix,
+            field,
+            trajectory.field(),
+            extent,
+            magnitude,
+            status_of(trajectory, code),
+            carried,
+            trajectory.beyond,
+            None if self.held is None else self.held.departure(point.t, point.x, magnitude),
+            self.system.turn_lengths,
+        )
+
+    def _trajectory(self, point: Point, mode: str | None) -> Trajectory:
+        """A run from a point that carries the columns of the identity."""
+        return start(
+            self.system,
+            point.x,
+            point.t,
+            mode=mode,
+            parameters=self.parameters,
+            solver=self.solver,
+            tangent=np.eye(self.system.dimension),
+        )
+
+    def newton(self, point: Point, free_period: bool, tolerance: float, max_iterations: int) -> PeriodicOrbit:
+        """Newton's method from ``point``; the period may be unknown too.
+
+        Conserved quantities are held. A period that is given may decide their values, so they are held there
+        only where it leaves them free.
+        """
+        shot = self.shoot(point)
+        share = float(np.sqrt(self.solver.rtol))
+        held = held_by(self.system, self.system.parameter_values(self.parameters), shot, share)
+        if held is not None and free_period:
+            return attrs.evolve(self, held=held)._search(shot, True, tolerance, max_iterations)
+        found = self._search(shot, free_period, tolerance, max_iterations)
+        if held is None or FAMILY not in found.status.message:
+            return found
+        other = attrs.evolve(self, held=held)._search(shot, False, tolerance, max_iterations)
+        return other if other.status.ok else found
+
+    def _search(self, shot: Shot, free_period: bool, tolerance: float, max_iterations: int) -> PeriodicOrbit:
+        """Newton's method from the first shot."""
+        if self.held is not None:
+            shot = attrs.evolve(
+                shot, departure=self.held.departure(shot.point.t, shot.point.x, shot.magnitude)
+            )
+        newton, iterations = Newton.begin(shot, self.solver.atol, free_period), 0
+        while iterations < max_iterations and shot.whole and newton.measurable(shot):
+            if shot.closes(tolerance, FINEST_GAP * EPSILON * shot.magnitude):
+                break
+            better = self._along(shot, newton)
+            iterations += 1
+            if better is None:
+                break
+            newton = newton.advanced(shot, better)
+            shot = better
+        return self._result(shot, newton, iterations, tolerance)
+
+    def _along(self, shot: Shot, newton: Newton) -> Shot | None:
+        """The shot after the step, or after a shorter one, that closes better; None if there is none.
+
+        Where orbits come in families, the step along the family is arbitrary and may be long, so the step
+        without it is tried too.
+        """
+        full, units = newton.step(shot), newton.measure(shot)
+        best = self._better(shot, shot, units, full)
+        if best.size(units) > NEARER * shot.size(units):
+            best = self._better(best, shot, units, newton.step(shot, NEARLY_SINGULAR))
+        part = 1.0
+        while best is shot and part > SHORTEST_STEP:
+            part /= 2
+            best = self._better(shot, shot, units, full, part)
+        return None if best is shot else best
+
+    def _better(
+        self, best: Shot, shot: Shot, units: np.ndarray, step: tuple[np.ndarray, float], part: float = 1.0
+    ) -> Shot:
+        """The best shot so far, or the one after a part of a step from ``shot`` if that closes better.
+
+        Gaps are compared in ``units (n,)``.
+        """
+        change, longer = step
+        period = shot.point.period + part * longer
+        if not period > 0:
+            return best
+        try:
+            trial = self.shoot(attrs.evolve(shot.point, x=shot.point.x + part * change, period=period))
+        except ArgumentError:
+            # No mode allows the point.
+            return best
+        # A step through a guard leads to other events.
+        crossed = set(trial.beyond) - set(shot.beyond)
+        return best if crossed or not trial.size(units) < best.size(units) else trial
+
+    def autonomous(self, guess: Point, tolerance: float, max_iterations: int) -> PeriodicOrbit:
+        """Newton's method from the point of the guess's orbit farthest from jumps, then back to the guess.
+
+        At a jump the end of the shot would depend discontinuously on the period.
+        """
+        shift = self._quiet_time(guess)
+        shooting, moved = self._moved(guess, shift)
+        orbit = shooting.newton(moved, True, tolerance, max_iterations)
+        if orbit.period < SHORTEST_PERIOD * guess.period:
+            # Every point closes after no time at all.
+            status = Status(
+                StatusCode.NOT_CONVERGED,
+                f"The period shrank from {guess.period:.3g} to {orbit.period:.3g}: a point, no orbit.",
+                "Start nearer to the orbit, with a better guess of its period.",
+            )
+            return attrs.evolve(orbit, status=status)
+        if not orbit.status.ok:
+            return orbit
+        return self._nearest(orbit, guess)
+
+    def hinted(self, orbit: PeriodicOrbit, guess: Point) -> PeriodicOrbit:
+        """The orbit, with a remedy for a search that failed since a component counts turns."""
+        if orbit.status.code != StatusCode.NOT_CONVERGED:
+            return orbit
+        moved = self._follow(guess, guess.period, self.mode).x[-1] - guess.x
+        for i in np.flatnonzero(np.abs(moved) > 0.5 * TURN).tolist():
+            if self.system.turn_lengths[i] == 0.0 and self._is_same_after_a_turn(i, guess):
+                name = self.system.state_names[i]
+                hint = (
+                    f"{name!r} moves by {moved[i]:.6g}, and a turn of 2 pi changes no function: if it is an "
+                    f"angle, declare it with HybridSystem(angles={{{name!r}: 2 * np.pi}})."
+                )
+                status = attrs.evolve(orbit.status, remedy=f"{orbit.status.remedy} {hint}".strip())
+                return attrs.evolve(orbit, status=status)
+        return orbit
+
+    def _is_same_after_a_turn(self, i: int, guess: Point) -> bool:
+        """Whether no function changes where a component is larger by 2 pi."""
+        system, values = self.system, self.system.parameter_values(self.parameters)
+        lengths = TURN * (np.arange(system.dimension) == i)
+        return all(
+            angle_fault_at(system.variables, function, guess.t, guess.x, values, lengths) is None
+            for _, function in functions_of(system)
+        )
+
+    def _quiet_time(self, guess: Point) -> float:
+        """Time after the guess at which neither it nor one period later is close to a jump."""
+        arc = self._follow(guess, 2 * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
+        jumps = np.concatenate([[0.0], arc.jumps.t - guess.t])
+        candidates = np.linspace(0, guess.period, 201)[1:-1]
+        distance = np.minimum(
+            np.abs(candidates[:, None] - jumps).min(axis=1),
+            np.abs(candidates[:, None] + guess.period - jumps).min(axis=1),
+        )
+        return float(candidates[np.argmax(distance)])
+
+    def _moved(self, guess: Point, shift: float) -> tuple[Shooting, Point]:
+        arc = self._follow(guess, shift, self.mode)
+        shooting = attrs.evolve(self, mode=str(arc.mode[-1]))
+        moved = Point(arc.x[-1], guess.t + shift, guess.period)
+        return shooting, attrs.evolve(moved, period=shooting._time_of_return(moved))
+
+    def _time_of_return(self, guess: Point) -> float:
+        """The guessed period, or a time near it at which the solution returns much nearer to its start.
+
+        With a wrong period, Newton's method prefers smaller orbits where orbits come in families.
+        """
+        arc = self._follow(guess, (1 + PERIOD_OFF) * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
+        times = guess.period * (1 + PERIOD_OFF * np.linspace(-1, 1, 2 * SAMPLES - 1))
+        if not arc.status.ok:
+            return guess.period
+        extent = np.ptp(arc.x, axis=0)
+        apart = [closed_change(each, self.system.turn_lengths) for each in arc(guess.t + times) - guess.x]
+        gaps = np.linalg.norm(apart / np.where(extent > 0, extent, 1.0), axis=1)
+        nearest = int(np.argmin(gaps))
+        return float(times[nearest]) if gaps[nearest] < NEARER * gaps[SAMPLES - 1] else guess.period
+
+    def _nearest(self, orbit: PeriodicOrbit, guess: Point) -> PeriodicOrbit:
+        """The same orbit from the point of its arc, away from jumps, that is nearest to the guess."""
+        arc = orbit.arc(self.solver)
+        extent = np.ptp(arc.x, axis=0)
+        # Distances in units of the orbit, so that those of the states do not matter.
+        apart = (arc.x - guess.x) / np.where(extent > 0, extent, 1.0)
+        times = arc.jumps.t
+        # On a jump, rounding would decide whether a run from the point makes it.
+        away = [np.all(np.abs(times - t) > POINT_ERROR * orbit.period) for t in arc.t]
+        i = int(np.argmin(np.where(away, np.linalg.norm(apart, axis=1), np.inf)))
+        return attrs.evolve(orbit, x0=arc.x[i], mode=str(arc.mode[i]), t0=float(arc.t[i]))
+
+    def _result(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> PeriodicOrbit:
+        eigenvalues, jumps = self._eigenvalues(shot), self._jumps(shot)
+        status = self._status(shot, newton, iterations, tolerance)
+        if status.ok:
+            status = self._explained(status, shot, newton, eigenvalues.values)
+        return PeriodicOrbit(
+            system=self.system,
+            parameters=self._all_parameters(),
+            x0=shot.point.x,
+            mode=shot.mode,
+            t0=shot.point.t,
+            period=float(shot.point.period),
+            multipliers=eigenvalues.values,
+            log_moduli=eigenvalues.log_moduli,
+            fundamental=shot.fundamental,
+            residual=length(shot.gap),
+            iterations=iterations,
+            signature=(shot.mode, *(jump.target for jump in jumps if jump.target is not None)),
+            transitions=tuple(jump.transition for jump in jumps),
+            status=status,
+            turns=turns_over(self.system, shot.end - shot.point.x),
+        )
+
+    def _all_parameters(self) -> dict[str, float]:
+        values = self.system.parameter_values(self.parameters).tolist()
+        return dict(zip(self.system.parameters, values, strict=True))
+
+    def _eigenvalues(self, shot: Shot) -> ProductEigenvalues:
+        """Those of the fundamental matrix from its factors, or nan where the run does not reach its end."""
+        return fundamental_eigenvalues(
+            lambda: self._trajectory(shot.point, shot.mode), shot.point.t + shot.point.period
+        )
+
+    def _drifts(self, shot: Shot, newton: Newton, tolerance: float) -> bool:
+        """Whether the part of the gap that no step removes is more than the error of the solver.
+
+        A solution that drifts does so at any tolerance.
+        """
+        finer = attrs.evolve(self, mode=shot.mode, solver=self.solver.tightened(TIGHTER**2)).shoot(shot.point)
+        if not finer.whole:
+            return True
+        rough, drift = (newton.drift(shot, each, np.sqrt(tolerance)) for each in (shot, finer))
+        noise = np.maximum(np.abs(rough - drift) / TIGHTER, shot.rounding[:, None])
+        return bool(np.any(np.abs(drift) > noise))
+
+    def _jumps(self, shot: Shot) -> list[Jump]:
+        """The jumps of one period; those at its point are counted once."""
+        arc = self._follow(shot.point, shot.point.period, shot.mode)
+        jumps, begin, end = list(arc.jumps), shot.point.t, shot.point.t + shot.point.period
+        size = abs(begin) + shot.point.period
+        if jumps and same_time(jumps[0].t, begin, size):
+            jumps = [jump for jump in jumps if not same_time(jump.t, end, size)]
+        return jumps
+
+    def _follow(self, point: Point, span: float, mode: str | None, max_jumps: int = 100_000) -> HybridArc:
+        """The arc from a point over a time, without tangent vectors."""
+        return simulate(
+            self.system,
+            point.x,
+            (point.t, point.t + span),
+            mode=mode,
+            parameters=self.parameters,
+            solver=self.solver,
+            max_jumps=max_jumps,
+        )
+
+    def _status(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> Status:
+        """How Newton's method ended: with an orbit, or why there is none."""
+        if not shot.status.ok:
+            return shot.status
+        reason = self._objection(shot, newton, iterations, tolerance)
+        if reason is None:
+            # With what the run along the orbit has to say of its crossings and its tangent vectors.
+            return shot.status
+        return Status(
+            StatusCode.NOT_CONVERGED,
+            f"Newton's method did not converge: {reason}.",
+            "Start nearer to the orbit (simulate first if it is stable), or raise max_iterations; if states "
+            "are small, give a solver= with a lower atol.",
+        )
+
+    def _explained(self, status: Status, shot: Shot, newton: Newton, multipliers: np.ndarray) -> Status:
+        """The status of an orbit, with what is held, and whether the orbit is still one of many."""
+        told = [] if self.held is None else [self.held.told]
+        if self._is_one_of_many(shot, newton, multipliers):
+            besides = " besides that of the flow" if newton.free_period else ""
+            told.append(f"{FAMILY}: a multiplier is 1{besides}, and the guess decides which one is found.")
+            remedy = f"{status.remedy} {HOLD_IT}".strip()
+            status = attrs.evolve(status, remedy=remedy)
+        return noting(status, *told)
+
+    def _is_one_of_many(self, shot: Shot, newton: Newton, multipliers: np.ndarray) -> bool:
+        """Whether a direction of the start is free, beside that along an autonomous orbit.
+
+        A small singular value alone may come from an instability, and a multiplier near 1 from a fold.
+        """
+        ones = int(np.sum(np.abs(multipliers - 1.0) <= NEAR_ONE))
+        if ones <= newton.free_period or not newton.nearly_singular(shot, NEARLY_SINGULAR):
+            return False
+        change, longer = newton.step(shot, NEARLY_SINGULAR)
+        moved = attrs.evolve(shot.point, x=shot.point.x + change, period=shot.point.period + longer)
+        finer = attrs.evolve(self, mode=shot.mode, solver=self.solver.tightened(TIGHTER**2)).shoot(moved)
+        return finer.whole and newton.free_directions(shot, finer)
+
+    def _objection(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> str | None:
+        """Why the last shot is no periodic orbit, or None if it is one.
+
+        The ends agree; the orbit moves, if nothing but its motion has a period; and what is left of Newton's
+        step is small. At infinity, or where a solution drifts, the ends may agree and that step is large. It
+        is arbitrary where orbits come in families: then the orbit has to be near to the guess, the method has
+        to have settled at it, and the solver's error alone may keep it from closing.
+        """
+        if shot.end_mode != shot.mode:
+            return f"the orbit ends in mode {shot.end_mode!r} and starts in {shot.mode!r}"
+        if not shot.whole or not newton.measurable(shot):
+            return "the tangent vectors left the range of numbers"
+        growth = shot.growth(newton.scale)
+        if not growth * EPSILON < 1.0:
+            return (
+                f"errors of the start grow by a factor of {growth:.3g} over the period, so no digit is left"
+            )
+        largest = np.abs([newton.anchor, shot.point.x, shot.end]).max()
+        if 0.0 < largest <= self.solver.atol:
+            return (
+                f"all states are below the atol of the solver, {self.solver.atol:.3g}, and so not controlled"
+            )
+        # A component that is below the solver's absolute tolerance throughout counts as zero.
+        nothing = np.where(shot.magnitude <= self.solver.atol, self.solver.atol, 0.0)
+        if not shot.closes(tolerance, shot.rounding, nothing):
+            return f"the residual is {length(shot.gap):.3g} after {iterations} iterations"
+        noise = np.maximum(ROUNDING_OF_GAP * EPSILON * shot.magnitude, nothing)
+        if newton.free_period and not np.any(shot.extent > LEAST_MOTION * noise):
+            return f"it led to an equilibrium: the state moves by {shot.extent.max():.3g} in all"
+        step, _ = newton.step(shot)
+        enough = np.maximum(np.sqrt(tolerance) * shot.extent, POINT_ERROR * shot.magnitude)
+        if newton.led_astray(shot, FARTHEST):
+            return "it went far along a direction in which the ends do not tell where an orbit is"
+        if np.all(np.abs(step) <= np.maximum(enough, nothing)):
+            return None
+        near = np.all((shot.extent <= FARTHEST * newton.first) & (np.abs(shot.gap) <= DRIFT * shot.extent))
+        sizes = np.where(shot.extent > noise, shot.extent, shot.magnitude)
+        settled = np.all(np.abs(newton.moved) <= np.maximum(SETTLED * sizes, noise))
+        if near and settled and not self._drifts(shot, newton, tolerance):
+            return None
+        return (
+            f"the ends agree to {length(shot.gap):.3g}, but the next step would move the start by "
+            f"{length(step):.3g}: the solution drifts, or no orbit is near"
+        )
