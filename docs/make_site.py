@@ -86,7 +86,7 @@ def write_pages(source: Path) -> None:
             write(source / file, json.dumps(notebook(text), indent=1))
             text = f"{as_notebook(text)}\n{{download}}`This page as a notebook <{file}>`\n"
         write(source / place(page), text)
-    for picture in [*HERE.rglob("*.png"), *(ROOT / "benchmarks").glob("*.png")]:
+    for picture in [*HERE.rglob("*.png"), *HERE.rglob("*.gif"), *(ROOT / "benchmarks").glob("*.png")]:
         (source / place(picture)).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(picture, source / place(picture))
     write_models(source)

@@ -32,7 +32,8 @@ def dois_in(text):
 
 
 def test_links_are_secure():
-    local = ("http://localhost", "http://127.0.0.1")
+    # A server on this machine has no certificate; its address is made when it starts.
+    local = ("http://localhost", "http://127.0.0.1", "http://{")
     for page, text in texts([*PAGES, *SOURCES]):
         plain = [url for url in URL.findall(text) if url.startswith("http:")]
         assert [url for url in plain if not url.startswith(local)] == [], page

@@ -59,7 +59,7 @@ class Page:
         self.board.words["address"] = " ".join(refused)
         # The last section and arc, as the worker knows them: before they are shown.
         self.latest: Live | None = None
-        self.jump, self.frame = -1, 0
+        self.jump, self.frame, self.seconds = -1, 0, 0.0
         figures = self.board.figures
         figures.choose(self.scene)
         self.widgets = Widgets(subject, self.scene, self)
@@ -231,10 +231,11 @@ class Page:
         if self.scene.over:
             self.board.figures.diagram.show_here(self.scene.values[self.scene.over])
         if picture == "live":
-            self.jump, self.frame = -1, 0
-            if self.board.live is not None:
-                self.widgets.tell_speed(len(self.board.live.points.x), outcome.seconds)
+            self.jump, self.frame, self.seconds = -1, 0, outcome.seconds
             return
+        # What follows can wait until the drag is over.
+        if self.board.live is not None:
+            self.widgets.tell_speed(len(self.board.live.points.x), self.seconds)
         self.widgets.show_script(self.script())
         self.widgets.progress.value = round(100 * self.board.progress)
 

@@ -105,6 +105,15 @@ def check_angles(case: Case) -> None:
     ------
     PropertyError
         If a value differs.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from hybrid import HybridSystem, Mode
+    >>> from hybrid.testing import Case, check_angles
+    >>> turning = Mode("turning", lambda t, x, p: (1.0 + 0.5 * np.sin(x.phi),))
+    >>> system = HybridSystem(state=("phi",), modes=[turning], angles={"phi": 2 * np.pi})
+    >>> check_angles(Case(system, {}, "turning", (0.3,), 0.0, 1.0))
     """
     as_case(case)
     system, x = case.system, np.array(case.x0)

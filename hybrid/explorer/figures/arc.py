@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.explorer.figures.base import HELD, JUMP, ORBIT, START, States, blank, empty, look_at, source
+from hybrid.explorer.figures.base import HELD, JUMP, ORBIT, START, Axes, States, blank, empty, source
 from hybrid.plot.arcs import curves
 from hybrid.plot.style import colour_of
 from hybrid.simulation.arc import HybridArc
@@ -26,13 +26,15 @@ class ArcFigures:
     def __init__(self, system: HybridSystem, states: States) -> None:
         self.system, self.states = system, states
         self.labels = Names(system.state_names, system.units)
+        names = system.state_names
         self.curves: dict[int, Any] = {}
         self.held, self.start, self.orbit, self.at = (states.source() for _ in range(4))
         ends = [f"{end}{i}" for end in ("a", "b") for i in range(len(states.names))]
         self.jumps = source("t", *ends)
         self.portrait = blank("Phase portrait", "portrait", 320)
         self.series = blank("Time series", "series", 240)
-        self.series.xaxis.axis_label = self.labels.label("t")
+        self.series.xaxis.axis_label = f"since the begin of the arc, {self.labels.label('t')}"
+        self.begin = self.length = 0.0
         first, second = states.components[0], states.components[-1]
         point = {"size": 10, "color": "white", "line_color": "black", "line_width": 2}
         # The renderers that follow the choice of axes.
@@ -49,10 +51,15 @@ class ArcFigures:
         self.time_jumps = self.series.segment(
             "t", "a0", "t", "b0", source=self.jumps, color=JUMP, line_dash="dotted"
         )
-        self.drawn_in_plane: list[Any] = []
+        self.portrait_axes, self.series_axes = Axes(self.portrait), Axes(self.series)
+        self.chosen: tuple[str, ...] = ()
+        self.extent = np.zeros((2, len(names)))
 
     def choose(self, across: str, up: str, component: str) -> None:
         """Draw these components."""
+        if (across, up, component) == self.chosen:
+            return
+        self.chosen = (across, up, component)
         for each in self.in_plane:
             each.glyph.x, each.glyph.y = self.states.column(across), self.states.column(up)
         for each in self.over_time:
@@ -64,15 +71,30 @@ class ArcFigures:
         self.portrait.xaxis.axis_label = self.labels.label(across)
         self.portrait.yaxis.axis_label = self.labels.label(up)
         self.series.yaxis.axis_label = self.labels.label(component)
+        self._fit(anew=True)
+
+    def _fit(self, *, anew: bool = False) -> None:
+        """Show the whole arc; the start may be far away from it."""
+        i, j, k = (self.states.names.index(each) for each in self.chosen)
+        ends = [(float(low), float(high)) for low, high in self.extent.T]
+        self.portrait_axes.show(ends[i], ends[j], anew=anew)
+        self.series_axes.show((0.0, self.length), ends[k], anew=anew)
 
     def show(self, arc: HybridArc, start: Any) -> None:
         """Draw an arc, and the start."""
         drawn = curves(arc)
+        self.begin = float(arc.t[0]) if len(arc.t) else 0.0
+        self.length = float(arc.t[-1]) - self.begin if len(arc.t) else 0.0
         for mode in {*self.curves, *drawn}:
-            t, x = drawn.get(mode, ((), ()))
-            self._curve_of(mode).data = self.states.rows(x, t)
+            t, x = drawn.get(mode, (np.empty(0), np.empty(0)))
+            self._curve_of(mode).data = self.states.rows(x, t - self.begin)
+        states = [x for _, x in drawn.values()]
+        if states:
+            both = np.concatenate(states)
+            self.extent = np.array([np.nanmin(both, axis=0), np.nanmax(both, axis=0)])
+        self._fit()
         jumps = arc.jumps
-        columns = {"t": np.asarray(jumps.t, dtype=float)}
+        columns = {"t": np.asarray(jumps.t, dtype=float) - self.begin}
         for end, x in (("a", jumps.x_minus), ("b", jumps.x_plus)):
             columns |= {f"{end}{i}": np.ascontiguousarray(x[:, i]) for i in range(len(self.states.names))}
         self.jumps.data = columns
@@ -86,11 +108,8 @@ class ArcFigures:
             across, up = self.in_plane[0].glyph.x, self.in_plane[0].glyph.y
             several = len(self.system.mode_names) > 1
             legend = {"legend_label": self.system.mode_names[mode]} if several else {}
-            self.drawn_in_plane.append(self.portrait.line(across, up, **options, **legend))
-            self.in_plane.append(self.drawn_in_plane[-1])
+            self.in_plane.append(self.portrait.line(across, up, **options, **legend))
             self.over_time.append(self.series.line("t", self.over_time[0].glyph.y, **options))
-            # The start may be far away from what is shown.
-            look_at(self.portrait, self.drawn_in_plane)
             if several:
                 legends = self.portrait.legend
                 legends.label_text_font_size, legends.background_fill_alpha = "8pt", 0.6
@@ -119,4 +138,4 @@ class ArcFigures:
 
     def show_at(self, t: float, x: Any) -> None:
         """Move the point that runs along the arc."""
-        self.at.data = self.states.rows(x, [t])
+        self.at.data = self.states.rows(x, [t - self.begin])

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from bokeh.models import ColumnDataSource, Span
+from bokeh.models import ColumnDataSource, Range1d, Span
 from bokeh.plotting import figure
 
 TOOLS = "pan,box_zoom,wheel_zoom,reset,save"
+# A range is this share wider than what it shows, and becomes narrower when so little of it is used.
+MARGIN, LEAST_USED = 0.06, 0.5
 HELD, JUMP, ORBIT, START = "#B0B0B0", "#595959", "#000000", "#000000"
 
 
@@ -47,10 +48,51 @@ def zero_line() -> Span:
     return Span(location=0.0, dimension="width", line_color=JUMP, line_dash="dashed")
 
 
-def look_at(made: Any, renderers: Sequence[Any]) -> None:
-    """Let the axes follow these renderers alone."""
-    for axis in (made.x_range, made.y_range):
-        axis.renderers = list(renderers)
+class Axes:
+    """The ranges of a figure, which follow what is shown until a visitor pans or zooms.
+
+    Ranges that the browser finds would let it draw twice, and labels that change their width would let it lay
+    out the page anew: a range grows with what is shown, and shrinks when less than half of it is used.
+    """
+
+    def __init__(self, made: Any) -> None:
+        self.ranges = (Range1d(-1.0, 1.0), Range1d(-1.0, 1.0))
+        made.x_range, made.y_range = self.ranges
+        self.held = False
+        self.wanted: tuple[tuple[float, float], ...] = ((-1.0, 1.0), (-1.0, 1.0))
+        made.on_event("rangesupdate", lambda event: self._moved())
+        made.on_event("reset", lambda event: self._release())
+
+    def show(self, *ends: tuple[float, float], anew: bool = False) -> None:
+        """Show at least these ends ``(low, high)`` across and up; ``anew``, and no more than these."""
+        self.wanted = tuple((low, high) if low < high else (low - 1.0, high + 1.0) for low, high in ends)
+        if anew:
+            self.held = False
+        if self.held:
+            return
+        for axis, (low, high) in zip(self.ranges, self.wanted, strict=True):
+            used = (high - low) / (axis.end - axis.start)
+            if anew or low < axis.start or high > axis.end or used < LEAST_USED:
+                margin = MARGIN * (high - low)
+                axis.start, axis.end = low - margin, high + margin
+
+    def _moved(self) -> None:
+        self.held = True
+
+    def _release(self) -> None:
+        self.show(*self.wanted, anew=True)
+
+    @property
+    def ends(self) -> tuple[tuple[float, float], ...]:
+        """What is shown, ``(low, high)`` across and up."""
+        return tuple((float(axis.start), float(axis.end)) for axis in self.ranges)
+
+
+def ends_of(*columns: Any) -> tuple[float, float]:
+    """Least and largest finite value of some columns; zeros if there is none."""
+    values = np.concatenate([np.ravel(np.asarray(each, dtype=float)) for each in columns])
+    values = values[np.isfinite(values)]
+    return (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
 
 
 class States:

@@ -8,7 +8,7 @@ import numpy as np
 from bokeh.models import HoverTool
 from bokeh.plotting import figure
 
-from hybrid.explorer.figures.base import States, blank, empty, look_at, source, zero_line
+from hybrid.explorer.figures.base import States, blank, empty, source, zero_line
 from hybrid.orbits.continuation.branch import Branch
 from hybrid.plot.style import COLOURS
 from hybrid.simulation.labelled import Names
@@ -60,7 +60,8 @@ class DiagramFigures:
             ),
             marks,
         ]  # fmt: skip
-        look_at(self.above, self.in_plane[:3])
+        for axis in (self.above.x_range, self.above.y_range):
+            axis.renderers = self.in_plane[:3]
         self.above.add_tools(
             HoverTool(renderers=[marks], tooltips=[("", "@kind"), ("at", "@parameter{0.000000}")])
         )

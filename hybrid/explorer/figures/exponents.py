@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from bokeh.models import HoverTool, Range1d, Whisker
 
-from hybrid.explorer.figures.base import JUMP, blank, empty, source, zero_line
+from hybrid.explorer.figures.base import JUMP, Axes, blank, empty, ends_of, source, zero_line
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.plot.style import COLOURS
 from hybrid.system.graph import HybridSystem
@@ -25,8 +25,8 @@ class ExponentsFigure:
         self.values = source("index", "value", "low", "high", "text")
         self.made = blank("Lyapunov exponents", "exponents", 240)
         self.made.add_layout(zero_line())
-        # The axis holds zero, since the sign counts.
-        self.made.scatter([1], [0.0], alpha=0.0)
+        self.axes = Axes(self.made)
+        self.index = (0.7, system.dimension + 0.3)
         self.made.scatter("index", "value", source=self.values, size=8, color=COLOURS[0])
         self.made.add_layout(Whisker(base="index", lower="low", upper="high", source=self.values))
         self.made.add_tools(HoverTool(tooltips=[("exponent", "@text")]))
@@ -38,6 +38,8 @@ class ExponentsFigure:
     def show(self, spectrum: LyapunovSpectrum) -> None:
         """Draw a spectrum."""
         values, error = spectrum.exponents, spectrum.standard_error
+        # The axis holds zero, since the sign counts.
+        self.axes.show(self.index, ends_of(values - error, values + error, [0.0]))
         self.values.data = {
             "index": np.arange(1, len(values) + 1),
             "value": values,

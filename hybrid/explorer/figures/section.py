@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from bokeh.models import LinearColorMapper
 
-from hybrid.explorer.figures.base import HELD, ORBIT, START, States, blank, empty, look_at, source
+from hybrid.explorer.figures.base import HELD, ORBIT, START, Axes, States, blank, empty, source
 from hybrid.plot.basins import NONE_COLOUR, VIOLATES_COLOUR
 from hybrid.plot.style import COLOURS, colour_of
 from hybrid.simulation.labelled import Names
@@ -60,16 +60,24 @@ class SectionFigure:
             self.made.scatter(first, second, source=self.orbit, size=12, marker="x", **cross),
             self.made.scatter(first, second, source=self.start, size=9, marker="cross", color=START),
         ]
-        # Two points that nobody sees keep the axes from looking at the rounding of a periodic orbit.
-        self.least = states.source()
-        self.in_plane.append(self.made.scatter(first, second, source=self.least, alpha=0.0))
-        look_at(self.made, [drawn, self.in_plane[-1]])
+        self.axes = Axes(self.made)
+        self.chosen: tuple[str, ...] = ()
+        self.extent = np.zeros((2, len(states.names)))
 
     def choose(self, across: str, up: str) -> None:
         """Draw these components."""
+        if (across, up) == self.chosen:
+            return
+        self.chosen = (across, up)
         for each in self.in_plane:
             each.glyph.x, each.glyph.y = self.states.column(across), self.states.column(up)
         self.made.xaxis.axis_label, self.made.yaxis.axis_label = map(self.labels.label, (across, up))
+        self._fit(anew=True)
+
+    def _fit(self, *, anew: bool = False) -> None:
+        i, j = (self.states.names.index(each) for each in self.chosen)
+        ends = [(float(low), float(high)) for low, high in self.extent.T]
+        self.axes.show(ends[i], ends[j], anew=anew)
 
     def show(self, x: np.ndarray, mode: np.ndarray, start: Any, extent: np.ndarray) -> None:
         """Draw points ``(N, n)`` with the names of their modes, and the start.
@@ -82,8 +90,11 @@ class SectionFigure:
         self.points.data = {**self.states.rows(x), "mode": column}
         self.start.data = self.states.rows(start)
         if len(x):
-            middle, half = (x.min(axis=0) + x.max(axis=0)) / 2, LEAST * extent / 2
-            self.least.data = self.states.rows([middle - half, middle + half])
+            # No less than a share of the arc: the points of a periodic orbit differ by rounding alone.
+            low, high = x.min(axis=0), x.max(axis=0)
+            lacking = np.maximum(LEAST * extent - (high - low), 0.0) / 2
+            self.extent = np.array([low - lacking, high + lacking])
+            self._fit()
 
     def hold(self, held: bool) -> None:
         """Keep what is drawn, in grey, to compare with; or let it go."""
@@ -98,22 +109,9 @@ class SectionFigure:
 
     @property
     def plane(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Ranges of the axes: as the browser shows them, or those of the points if none has shown them."""
-        glyph = self.in_plane[1].glyph
-        across, up = (
-            self._ends(axis, column)
-            for axis, column in ((self.made.x_range, glyph.x), (self.made.y_range, glyph.y))
-        )
+        """Ranges of the axes, as they are shown."""
+        across, up = self.axes.ends
         return across, up
-
-    def _ends(self, axis: Any, column: str) -> tuple[float, float]:
-        ends = (float(axis.start), float(axis.end))
-        if np.isfinite(ends).all() and ends[0] < ends[1]:
-            return ends
-        found = np.asarray(self.points.data[column], dtype=float)
-        low, high = (float(found.min()), float(found.max())) if len(found) else (-1.0, 1.0)
-        margin = 0.1 * (high - low) or 1.0
-        return low - margin, high + margin
 
     def show_basins(self, label: np.ndarray, across: np.ndarray, up: np.ndarray) -> None:
         """Paint labels ``(rows, columns)`` over the values of both components."""

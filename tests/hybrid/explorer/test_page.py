@@ -161,7 +161,7 @@ def test_the_point_runs_along_the_arc(opened):
         page.tick()
     data = page.board.figures.arc.at.data
     arc = page.board.live.arc
-    np.testing.assert_allclose([data["x0"][0], data["x1"][0]], arc(data["t"][0]))
+    np.testing.assert_allclose([data["x0"][0], data["x1"][0]], arc(arc.t[0] + data["t"][0]))
     assert "Jump" in page.widgets.event.object
 
 
