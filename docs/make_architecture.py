@@ -28,7 +28,7 @@ PATHS = {
         "hybrid.orbits",
         "hybrid.accuracy",
         "hybrid.sweep",
-        "hybrid.attractors",
+        "hybrid.explorer",
     ),
     "compile": ("hybrid.system", "hybrid.symbolic", "hybrid.transform", "hybrid.compiler"),
     "run": ("hybrid.simulation", "hybrid.kernels", "hybrid.solvers"),
@@ -46,7 +46,7 @@ def room_of(path: Path) -> str:
     parts = path.relative_to(ROOT).with_suffix("").parts
     if parts[0] != "hybrid":
         return parts[0]
-    return "hybrid" if parts[1] in ("__init__", "__main__") else f"hybrid.{parts[1]}"
+    return "hybrid" if parts[1] == "__init__" else f"hybrid.{parts[1]}"
 
 
 def rooms() -> nx.DiGraph:
