@@ -105,7 +105,7 @@ def draw(graph: nx.DiGraph, path: Path) -> None:
         mpl.lines.Line2D([], [], color=COLOURS[kind], linewidth=2, label=text)
         for kind, text in LEGEND.items()
     ]
-    ax.legend(handles=handles, loc="upper right", bbox_to_anchor=(1.0, 0.93), frameon=False, fontsize=9)
+    ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(0.0, 1.0), frameon=False, fontsize=9)
     ax.set_xlim(-0.3, 10.3)
     ax.set_ylim(-0.6, len(levels) - 0.4)
     ax.set_axis_off()
