@@ -9,6 +9,8 @@ from typing import Any
 import attrs
 import numpy as np
 
+# How a script begins.
+OPENING = "import hybrid\nimport lyapunov\nimport matplotlib.pyplot as plt\nimport numpy as np\n"
 # A call that is longer is written with one argument per line.
 LINE = 100
 

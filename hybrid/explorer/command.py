@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from hybrid.errors import ArgumentError, HybridError, unknown_name
-from hybrid.explorer.explore import GIVEN, serve
-from hybrid.explorer.subject import subject
+from hybrid.explorer.calls import OPENING
 from hybrid.system.graph import HybridSystem
 
 Value = TypeVar("Value")
@@ -35,6 +34,10 @@ def add_options(options: argparse.ArgumentParser) -> None:
 
 def explore_model(given: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C; returns the exit status."""
+    # The other commands run where the packages that the page needs are not installed, as when a wheel is built.
+    from hybrid.explorer.explore import serve
+    from hybrid.explorer.subject import subject
+
     try:
         system, text = model_of(given.model)
         start = _named("--start", given.start, _number)
@@ -92,7 +95,7 @@ def _from_module(module: str, name: str) -> tuple[Any, str]:
         loaded = importlib.import_module(module)
     except ModuleNotFoundError as error:
         raise ArgumentError(f"Module {module!r} was not found ({error}). Name {WANTED}.") from error
-    return _member(module, name, vars(loaded)), f"{GIVEN}\nfrom {module} import {name}\n"
+    return _member(module, name, vars(loaded)), f"{OPENING}\nfrom {module} import {name}\n"
 
 
 def _from_file(file: str, name: str) -> tuple[Any, str]:
@@ -102,7 +105,7 @@ def _from_file(file: str, name: str) -> tuple[Any, str]:
     members = runpy.run_path(str(path))
     return _member(
         file, name, members
-    ), f'import runpy\n\n{GIVEN}\n{name} = runpy.run_path({file!r})["{name}"]\n'
+    ), f'import runpy\n\n{OPENING}\n{name} = runpy.run_path({file!r})["{name}"]\n'
 
 
 def _member(module: str, name: str, members: dict[str, Any]) -> Any:

@@ -9,11 +9,11 @@ from typing import Any
 
 from hybrid import arguments
 from hybrid.errors import HybridError
+from hybrid.explorer.calls import OPENING
 from hybrid.explorer.subject import Subject, subject
 from hybrid.system.graph import HybridSystem
 
 INSTALL = "hybrid.explore needs Panel and Bokeh. Install them: pip install 'hybrid-systems[explore]'."
-GIVEN = "import hybrid\nimport lyapunov\nimport matplotlib.pyplot as plt\nimport numpy as np\n"
 THE_SYSTEM = "# system is the model that was given to hybrid.explore.\n"
 LOCAL = ("localhost", "127.0.0.1", "::1")
 
@@ -86,7 +86,7 @@ def explore(
     HybridError
         If Panel is not installed.
     """
-    found = subject(system, GIVEN + "\n" + THE_SYSTEM, x0, mode=mode, parameters=parameters, ranges=ranges)
+    found = subject(system, OPENING + "\n" + THE_SYSTEM, x0, mode=mode, parameters=parameters, ranges=ranges)
     return serve(found, port=port, address=address, block=block, show=show)
 
 
