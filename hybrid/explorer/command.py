@@ -34,7 +34,7 @@ def add_options(options: argparse.ArgumentParser) -> None:
 
 def explore_model(given: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C; returns the exit status."""
-    # The other commands run where the packages that the page needs are not installed, as when a wheel is built.
+    # The other commands run where the packages of the page are not installed, as when a wheel is built.
     from hybrid.explorer.explore import serve
     from hybrid.explorer.subject import subject
 
