@@ -174,18 +174,12 @@ NEAREST = {
     "hybrid/kernels/events/soon.py": ("kernels/events/test_soon_rules.py",),
     "hybrid/kernels/events/surface.py": ("kernels/events/test_surface_rules.py",),
     "hybrid/kernels/jumps/chatter.py": (
-        "kernels/jumps/test_chatter_rules.py",
         "kernels/jumps/test_chatter_matrix.py",
         "kernels/jumps/test_chatter_units.py",
         "kernels/jumps/test_chatter_bent.py",
         "kernels/jumps/test_chatter_tangents.py",
         "kernels/jumps/test_skipped.py",
         "kernels/jumps/test_rounds.py",
-    ),
-    "hybrid/kernels/jumps/collapse.py": (
-        "kernels/jumps/test_collapse_rules.py",
-        "kernels/jumps/test_rounds.py",
-        "kernels/jumps/test_locked.py",
     ),
     "hybrid/kernels/jumps/corner.py": (
         "kernels/jumps/test_corner_rules.py",
@@ -197,7 +191,7 @@ NEAREST = {
         "kernels/jumps/test_rounds.py",
         "kernels/jumps/test_skipped.py",
     ),
-    "hybrid/kernels/jumps/endless.py": ("kernels/jumps/test_endless_rules.py",),
+    "hybrid/kernels/jumps/endless.py": ("kernels/jumps/test_endless.py",),
     "hybrid/kernels/jumps/jump.py": (
         "kernels/jumps/test_jump_rules.py",
         "kernels/jumps/test_steep.py",
@@ -219,11 +213,7 @@ NEAREST = {
         "kernels/jumps/test_chatter.py",
         "kernels/jumps/test_chatter_tangents.py",
     ),
-    "hybrid/kernels/jumps/skipped.py": (
-        "kernels/jumps/test_skipped_rules.py",
-        "kernels/jumps/test_chatter.py",
-    ),
-    "hybrid/kernels/jumps/slower.py": ("kernels/jumps/test_slower_rules.py",),
+    "hybrid/kernels/jumps/skipped.py": ("kernels/jumps/test_chatter.py",),
     "hybrid/kernels/jumps/steep.py": ("simulation/test_infinite_slopes.py",),
     "hybrid/kernels/steps/dense.py": (
         "simulation/test_arc.py",

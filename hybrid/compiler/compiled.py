@@ -298,6 +298,7 @@ class CompiledSystem:
             field_before=_indices(before for before, _ in self.emitted.crossing),
             field_behind=_indices(behind for _, behind in self.emitted.crossing),
             timed=_indices(self._is_timed(i) for i in range(len(system.modes))),
+            read_by=np.array(self.emitted.read_by, dtype=np.int64),
             jumping_reset=_indices(self.emitted.jumping_reset),
             conditional=_indices(
                 any(each.source == name and each.guard.when is not None for each in transitions)

@@ -144,6 +144,9 @@ class Emitted:
         Whether every function is proved to have the declared period, whatever the parameters.
     timed_guard, timed_reset
         By transition: whether the guard, or the reset, may depend on time.
+    read_by
+        By mode and component: BY_GUARD if a guard or a condition depends on it, BY_FLOW if another rate or
+        another component of a reset does, else BY_NOTHING, as for a counter.
     jumping_reset
         By transition: whether its reset is not proved to be continuous.
     steep
@@ -180,6 +183,7 @@ class Emitted:
     proved_period: bool
     timed_guard: tuple[bool, ...]
     timed_reset: tuple[bool, ...]
+    read_by: tuple[tuple[int, ...], ...]
     jumping_reset: tuple[bool, ...]
     steep: tuple[str, ...]
     steep_inside: tuple[str, ...]

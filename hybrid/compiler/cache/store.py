@@ -81,7 +81,8 @@ def _read(content: bytes | None) -> Emitted | None:
         )
         for name in (*of_transitions, *of_modes, "timed_guard", "timed_reset", "jumping_reset", *parts):
             found[name] = tuple(found[name])
-        found["crossing"] = tuple(map(tuple, found["crossing"]))
+        for name in ("crossing", "read_by"):
+            found[name] = tuple(map(tuple, found[name]))
         found["slope_columns"] = tuple(tuple(map(tuple, rows)) for rows in found["slope_columns"])
         names = ("rows", "checked", "numbers", "first")
         rows, checked, numbers, first = (found["programs"][name] for name in names)

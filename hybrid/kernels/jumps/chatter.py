@@ -14,7 +14,6 @@ from hybrid.kernels.events.guards import (
     rounding_band,
 )
 from hybrid.kernels.jumps.rounds import fired_before, mark_endless
-from hybrid.kernels.jumps.slower import impact, slower_are_alike
 from hybrid.kernels.types.codes import ENDLESS
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
@@ -200,10 +199,6 @@ def accumulation(model, method, run, transition, since_last, work):
         noise = NOISE * gain * band / height
         floor = misfit > ratio * run.trail[IMPULSE, n] and misfit * method.rtol < min(ROUGH, noise)
         found = drowned or (shallow and (misfit <= 1.0 or floor))
-        if found:
-            apart = math.inf if drowned else misfit
-            impulse, towards = run.trail[IMPULSE], side * speed
-            found = slower_are_alike(model, method, run, transition, towards, span, impulse, apart, work)
         run.trail[IMPULSE, n] = misfit
         run.chattering += 1
     else:
@@ -226,6 +221,17 @@ def remember_impulse(model, run, transition, transversality, work):
         # A reset that puts the state back on the guard only removes the rounding error of the landing.
         rounding = abs(change) <= 16.0 * EPSILON * run.scale[i]
         run.trail[IMPULSE, i] = 0.0 if rounding else change / (after - transversality)
+
+
+@njit(**KERNEL)
+def impact(model, run, transition, t, x, after, work):
+    """Restitution of an impact from ``x (n,)`` to ``after (n,)``, and the change of the guard's speed."""
+    model.field(run.mode, t, x, model.parameters, work.field)
+    before = guard_speed(model, transition, t, x, work.field, work.gradient)
+    model.reset(transition, t, x, model.parameters, after)
+    model.field(run.mode, t, after, model.parameters, work.field)
+    later = guard_speed(model, transition, t, after, work.field, work.gradient)
+    return -later / before, later - before
 
 
 @njit(**KERNEL)

@@ -15,7 +15,6 @@ from hybrid.kernels.jumps.chatter import (
     add_change_of_duration,
     chatter_matrix,
 )
-from hybrid.kernels.jumps.collapse import UNTIL_NEXT_LOOK, limit_at_once
 from hybrid.kernels.jumps.drift import (
     BRIEF,
     drift,
@@ -84,7 +83,7 @@ def follow_impacts(task, transition, remaining):
     # Tangent vectors along the mean field have an error of third order.
     if apart and steep > max(BRIEF, noise ** (1.0 / 3.0)):
         return False
-    if not may_be_held(model, run, 1, span, x_limit, work):
+    if not may_be_held(model, run, 1, span):
         return False
     remember_flight(run, record, model.dimension, span, x_limit)
     begin_instant(run, model.dimension, tangents, work)
@@ -123,19 +122,7 @@ def follow_to_rest(task):
     turn = jumps_in_turn(run)
     for i in range(model.dimension):
         work.settled[i] = run.y[i]
-    if not has_come_to_rest(model, run, turn, work.settled, 1.0, work):
-        return False
-    return way_is_free(model, method, run, turn, 0.0, work) and go_to_limit(task, turn, 0.0)
-
-
-@njit(**KERNEL)
-def follow_collapse(task):
-    """``finish_chatter`` for jumps at one instant that shrink the speeds by a steady ratio."""
-    _, model, method, run, _, work = task_of(task)
-    if run.jumps_here < MANY_AT_ONCE or (run.jumps_here - MANY_AT_ONCE) % UNTIL_NEXT_LOOK != 0:
-        return False
-    turn, rounds = limit_at_once(model, run, work)
-    if turn == 0 or not has_come_to_rest(model, run, turn, work.settled, rounds, work):
+    if not has_come_to_rest(model, run, turn, work.settled, work):
         return False
     return way_is_free(model, method, run, turn, 0.0, work) and go_to_limit(task, turn, 0.0)
 
@@ -151,7 +138,7 @@ def go_to_limit(task, turn, left):
     transition = next_in_turn(model, run, turn)
     if transition == NO_TRANSITION:
         return False
-    if not may_be_held(model, run, turn, left, work.settled, work):
+    if not may_be_held(model, run, turn, left):
         return False
     target, onward = mode_of_limit(model, run, transition, run.phase + left, work.settled, work)
     if left > 0.0:
@@ -183,4 +170,4 @@ def finish_chatter(task, transition, remaining):
     """
     if follow_impacts(task, transition, remaining) or follow_rounds(task, remaining):
         return True
-    return follow_to_rest(task) or follow_collapse(task)
+    return follow_to_rest(task)

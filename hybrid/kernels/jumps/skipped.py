@@ -72,12 +72,12 @@ def way_is_free(model, method, run, turn, span, work):
 
 
 @njit(**KERNEL)
-def has_come_to_rest(model, run, turn, x, rounds, work):
+def has_come_to_rest(model, run, turn, x, work):
     """Whether a state ``x (n,)`` rests on the guards of the last ``turn`` jumps, and no reset moves it.
 
     So ends a chatter whose flights shorten without a steady ratio, such as that of two balls on a floor that
-    take turns in varying order: its last jumps happen within the rounding of time. Speeds may have the
-    rounding errors of so many ``rounds`` of jumps. Counters, which each round moves, are marked.
+    take turns in varying order: its last jumps happen within the rounding of time. Counters, which each
+    round moves, are marked.
     """
     n, mode, t = model.dimension, run.mode, run.phase
     share, clock, moved = AT_REST * ROUNDING_OF_STATE * EPSILON, size_of_time(model, t), work.trial
@@ -87,7 +87,7 @@ def has_come_to_rest(model, run, turn, x, rounds, work):
         for row in range(min(run.jumps, run.visits.shape[0])):
             size = max(size, abs(run.visits[row, i]))
         moved[i] = share * (size + clock * abs(work.field[i]))
-        work.rounding[0, i] = 2.0 * rounds * moved[i]
+        work.rounding[0, i] = 2.0 * moved[i]
     mark_endless(model, run, turn, t, x, work.rounding[0], work)
     for back in range(turn):
         transition = fired_before(run, back)
@@ -98,11 +98,11 @@ def has_come_to_rest(model, run, turn, x, rounds, work):
         for i in range(n):
             height += abs(work.gradient[i]) * moved[i]
             fastest += abs(work.gradient[i]) * spread_of_rate(model, mode, i, work.jacobian, moved)
-        if not (abs(value) <= height and abs(speed) <= rounds * fastest):
+        if not (abs(value) <= height and abs(speed) <= fastest):
             return False
         model.reset(transition, t, x, model.parameters, work.state)
         for i in range(n):
-            moves = not abs(work.state[i] - x[i]) <= 2.0 * rounds * moved[i]
+            moves = not abs(work.state[i] - x[i]) <= 2.0 * moved[i]
             if moves and run.trail[ENDLESS, i] == 0.0:
                 return False
     return True

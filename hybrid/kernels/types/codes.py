@@ -38,6 +38,9 @@ LIMIT_OF_CHATTER = 2
 ENDLESS = 3
 HELD = 4
 
+# What in a mode depends on a component of the state, besides its own rate and its own row of resets.
+BY_NOTHING, BY_FLOW, BY_GUARD = range(3)
+
 # Target of a transition that ends the run, and limit of a chatter that names none.
 NO_MODE = -1
 

@@ -73,6 +73,7 @@ class Model(Structure):
     and ``field_behind`` are the numbers of the fields at the crossing of a guard, on its two sides.
     ``timed`` is 1 for a mode whose field or one of whose guards may depend on time, ``timed_jump`` for a
     transition whose guard or reset may. ``jumping_reset`` is 1 for one whose reset may jump,
+    ``read_by (modes, n)`` says what depends on a component besides itself,
     ``conditional`` for a mode that is left under conditions.
     ``tangent_start`` is the first column of tangent vectors in series, ``tangent_columns`` how many four of
     them have in each mode. ``period`` is 0 without a forcing period.
@@ -123,6 +124,7 @@ class Model(Structure):
     field_behind: INDICES
     timed: INDICES
     timed_jump: INDICES
+    read_by: INDEX_MATRIX
     jumping_reset: INDICES
     conditional: INDICES
     tangent_start: INTEGER
