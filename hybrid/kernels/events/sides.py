@@ -1,6 +1,7 @@
 """On which side of each guard a state is, and which guards it has crossed at this instant."""
 
 import math
+from typing import Any, NamedTuple
 
 from numba import njit
 
@@ -32,7 +33,7 @@ from hybrid.kernels.events.guards import (
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING, is_zero
 from hybrid.kernels.events.soon import acceleration_soon
 from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION, RESTING
-from hybrid.kernels.types.options import KERNEL
+from hybrid.kernels.types.options import INLINE, KERNEL
 
 # How the state came to this point: the run starts here, the flow led here, or a reset put the state here.
 STARTED, FLOWED, LANDED = range(3)
@@ -40,13 +41,55 @@ STARTED, FLOWED, LANDED = range(3)
 KEPT = 1e-3
 
 
+class Place(NamedTuple):
+    """Where a run is: its mode, the time ``t`` and the state ``x (n,)``."""
+
+    mode: Any
+    t: Any
+    x: Any
+
+
+class Arrival(NamedTuple):
+    """How the state came there, the mode that it has left, and the transition whose reset led here."""
+
+    came: Any
+    left: Any
+    fired: Any
+
+
+class Sides(NamedTuple):
+    """What is known of the guards ``(transitions,)``.
+
+    The ``side`` of each; whether it is ``due``, as it has been crossed at this instant and has not fired; and
+    its order from ``side_of``, which is ``zero`` off the guard.
+    """
+
+    side: Any
+    due: Any
+    zero: Any
+
+
+class Before(NamedTuple):
+    """The side of one guard before, and its order."""
+
+    side: Any
+    order: Any
+
+
+@njit(**INLINE)
+def sides_of(run):
+    """What a run knows of its guards."""
+    return Sides(run.side, run.due, run.on_guard)
+
+
 @njit(**KERNEL)
-def inherit(model, left, transition, side, due, zero):
+def inherit(model, left, transition, sides):
     """Take over what the mode just left knew of a transition's guard; returns whether it has the guard.
 
     A crossing is still due only if no transition on that guard in that direction has fired for it. On a guard
     at rest each direction has its own near side: the side for the same direction counts, if there is one.
     """
+    side, due, zero = sides
     known, pending, now, order = False, -1, 0, 0
     for slot in range(model.first_outgoing[left], model.first_outgoing[left + 1]):
         other = model.outgoing[slot]
@@ -195,105 +238,149 @@ def is_held_beside(model, run, transition, mode, t, x, towards, work):
 
 
 @njit(**KERNEL)
-def take_sides(model, run, mode, t, x, came, left, fired, side, due, zero, work):
+def side_here(model, run, place, transition, before, known, own, work):
+    """``side_of`` a guard, where one that a coarser rounding let fire early is not taken for crossed."""
+    mode, t, x = place
+    was_on = known and before.order > 0
+    now, order = side_of(model, run, mode, transition, t, x, before.side, was_on, work)
+    if known and not own and order == 0 and before.side == -now:
+        speed = guard_speed(model, transition, t, x, work.field, work.gradient)
+        if was_left_behind(model, run, transition, t, x, speed, before.side, work):
+            # It has fired within a coarser rounding of this place, and only now reaches its guard.
+            now = before.side
+    return now, order
+
+
+@njit(**KERNEL)
+def crosses_slowly(model, run, place, transition, work):
+    """Whether the jump that led here has crossed its guard with no more speed than rounding makes."""
+    mode, t, x = place
+    return abs(run.last_transversality) <= speed_rounding(model, run, transition, mode, t, x, work)
+
+
+@njit(**KERNEL)
+def side_after_own_reset(model, run, place, transition, now, order, was_on, work):
+    """The side of the guard that has just fired and whose reset led back to its mode, and its order.
+
+    Also whether the next step must show the side, since the guard has a root of third order that was crossed
+    without speed, and whether the reset holds the state on the guard.
+    """
+    mode, t, x = place
+    direction = model.direction[transition]
+    flat = was_on and order == BY_STEP and crosses_slowly(model, run, place, transition, work)
+    jumps = order == JUMPING or (order == BY_STEP and may_jump(model, run, transition, t, x, work))
+    if not flat and order == BY_STEP and direction != 0:
+        # Its own reset has stopped the state on the guard, as a plastic impact does.
+        now = -direction
+    signs = order != BY_ACCELERATION and leaves_by_signs(model, transition)
+    if signs and order == BY_SPEED:
+        signs = crosses_slowly(model, run, place, transition, work)
+    held = False
+    if jumps or signs:
+        # The flow may go on across the guard that has just fired, or back from it.
+        moments = MOST_MOMENTS if order > 0 else FEW_MOMENTS
+        _, beside, moment = signs_beside(model, run, transition, t, x, moments, work)
+        if beside != 0:
+            # Off the guard, where it has left the state, it has not been reached again.
+            if order > 0 or beside != now:
+                now, order, flat = beside, JUMPING, False
+            held = signs and turns_within(model, transition, mode, t, x, LONGER * moment, beside, work)
+        elif signs and order > 0 and direction != 0:
+            held = is_held_beside(model, run, transition, mode, t, x, direction, work)
+    return now, order, flat, held
+
+
+@njit(**KERNEL)
+def crossed_by_flow(model, run, place, transition, before, now, order, work):
+    """Whether the flow has taken a guard across zero here; with its side and its order."""
+    _, t, x = place
+    direction = model.direction[transition]
+    if order == JUMPING or (order == BY_STEP and may_jump(model, run, transition, t, x, work)):
+        order = JUMPING
+        first, beside, _ = signs_beside(model, run, transition, t, x, MOST_MOMENTS, work)
+        now = beside if beside != 0 else now
+        # The guard may have jumped and fired already, within the rounding of this place.
+        before = (first if first != 0 else now) if before == 0 else before
+    on = order in (0, BY_SPEED, JUMPING)
+    crossed = on and before == -now and (direction == 0 or now == direction)
+    if crossed and order == 0:
+        # The step to another guard has passed this one by more than rounding.
+        order = order_passed(model, transition)
+    return crossed, now, order
+
+
+@njit(**KERNEL)
+def take_side(model, run, place, transition, arrival, known_sides, work):
+    """Take the side of one guard; returns whether the state rests on it, pushed against it."""
+    mode, t, x = place
+    came, left, fired = arrival
+    direction = model.direction[transition]
+    known = came != STARTED
+    if came == LANDED and left != mode:
+        known = inherit(model, left, transition, known_sides)
+    side = known_sides.side[transition] if known else 0
+    before = Before(side, known_sides.zero[transition])
+    was_on = known and before.order > 0
+    own = came == LANDED and left == mode and transition == fired
+    now, order = side_here(model, run, place, transition, before, known, own, work)
+    flat, rests = False, False
+    if own:
+        now, order, flat, held = side_after_own_reset(model, run, place, transition, now, order, was_on, work)
+        rests = held and allowed(model, transition, t, x, work.scalar)
+    due = known_sides.due[transition] == 1
+    if came == STARTED:
+        crossed = is_zero(order) and direction != 0 and now == direction
+    elif came == FLOWED:
+        crossed, now, order = crossed_by_flow(model, run, place, transition, before.side, now, order, work)
+    else:
+        crossed = crossed_by_landing(model, transition, known, own, was_on, before.side, now, order)
+        # A guard that fires both ways and was due already: this crossing takes the first one back.
+        crossed = crossed and not (direction == 0 and due)
+    beyond = now == (direction if direction != 0 else before.side)
+    pushed = (
+        came == LANDED and left == mode and was_on and not crossed and beyond and order == BY_ACCELERATION
+    )
+    if pushed and not due and model.marker[transition] == 0:
+        pushed = is_held(model, run, transition, mode, t, x, now, work)
+        # Another transition's reset left the state at rest: the guard's own reset must hold it again.
+        crossed = pushed and not own
+        rests = rests or (pushed and own and allowed(model, transition, t, x, work.scalar))
+        if pushed and own and direction != 0:
+            # Held on the guard, the state has not crossed it: another reset may yet push it through.
+            now = -direction
+    elif flat and direction != 0 and is_held(model, run, transition, mode, t, x, direction, work):
+        # A push that only begins: it has no acceleration yet.
+        rests = rests or allowed(model, transition, t, x, work.scalar)
+    pending = came == LANDED and due and beyond
+    if model.marker[transition] == 1 and came != FLOWED:
+        # A marker fires where the flow crosses it. After a jump it fires only if the flow has reached it
+        # together with the first jump, and has not been stopped there.
+        stopped = order == BY_STEP and before.order != BY_STEP
+        crossed, pending = False, pending and was_on and order > 0 and not stopped
+        # A run that starts on the guard has crossed nothing, whichever side the next step shows.
+        flat = flat or (came == STARTED and order == BY_STEP)
+    known_sides.side[transition], known_sides.zero[transition] = 0 if flat else now, order
+    known_sides.due[transition] = 1 if crossed or pending else 0
+    return rests
+
+
+@njit(**KERNEL)
+def take_sides(model, run, mode, t, x, arrival, known_sides, work):
     """Take sides at every guard of a mode; return the transition that must fire now, if any.
 
-    ``side``, ``due`` and ``zero (transitions,)`` hold the side of each guard, whether the guard has been
-    crossed at this instant without having fired, and its order from ``side_of``. On entry they belong to the
-    previous point, in the mode ``left``; on return they belong to this point. ``fired`` is the transition
-    whose reset led here. A guard that has been crossed stays due while the state is beyond it. Of the due
-    transitions whose condition holds, the first in the list fires. If none fires and the state rests on the
-    guard that has just fired, pushed against it, the result is ``RESTING``.
+    ``known_sides`` belong to the previous point on entry, and to this point on return. A guard that has been
+    crossed stays due while the state is beyond it. Of the due transitions whose condition holds, the first in
+    the list fires. If none fires and the state rests on the guard that has just fired, pushed against it, the
+    result is ``RESTING``.
     """
     model.field(mode, t, x, model.parameters, work.field)
-    chosen, rests = NO_TRANSITION, False
+    chosen, rests, place = NO_TRANSITION, False, Place(mode, t, x)
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
-        direction = model.direction[transition]
-        known = came != STARTED
-        if came == LANDED and left != mode:
-            known = inherit(model, left, transition, side, due, zero)
-        before = side[transition] if known else 0
-        was_on = known and zero[transition] > 0
-        own = came == LANDED and left == mode and transition == fired
-        now, order = side_of(model, run, mode, transition, t, x, before, was_on, work)
-        if known and not own and order == 0 and before == -now:
-            speed = guard_speed(model, transition, t, x, work.field, work.gradient)
-            if was_left_behind(model, run, transition, t, x, speed, before, work):
-                # It has fired within a coarser rounding of this place, and only now reaches its guard.
-                now = before
-        # A root of third order, crossed without speed: the next step shows the side.
-        flat = (
-            own
-            and was_on
-            and order == BY_STEP
-            and abs(run.last_transversality) <= speed_rounding(model, run, transition, mode, t, x, work)
-        )
-        jumps = order == JUMPING or (order == BY_STEP and may_jump(model, run, transition, t, x, work))
-        if own and not flat and order == BY_STEP and direction != 0:
-            # Its own reset has stopped the state on the guard, as a plastic impact does.
-            now = -direction
-        signs = own and order != BY_ACCELERATION and leaves_by_signs(model, transition)
-        if signs and order == BY_SPEED:
-            rounding = speed_rounding(model, run, transition, mode, t, x, work)
-            signs = abs(run.last_transversality) <= rounding
-        if own and (jumps or signs):
-            # The flow may go on across the guard that has just fired, or back from it.
-            moments = MOST_MOMENTS if order > 0 else FEW_MOMENTS
-            _, beside, moment = signs_beside(model, run, transition, t, x, moments, work)
-            held = False
-            if beside != 0:
-                # Off the guard, where it has left the state, it has not been reached again.
-                if order > 0 or beside != now:
-                    now, order, flat = beside, JUMPING, False
-                held = signs and turns_within(model, transition, mode, t, x, LONGER * moment, beside, work)
-            elif signs and order > 0 and direction != 0:
-                held = is_held_beside(model, run, transition, mode, t, x, direction, work)
-            rests = rests or (held and allowed(model, transition, t, x, work.scalar))
-        if came == STARTED:
-            crossed = is_zero(order) and direction != 0 and now == direction
-        elif came == FLOWED:
-            if jumps:
-                order = JUMPING
-                first, beside, _ = signs_beside(model, run, transition, t, x, MOST_MOMENTS, work)
-                now = beside if beside != 0 else now
-                # The guard may have jumped and fired already, within the rounding of this place.
-                before = (first if first != 0 else now) if before == 0 else before
-            on = order in (0, BY_SPEED, JUMPING)
-            crossed = on and before == -now and (direction == 0 or now == direction)
-            if crossed and order == 0:
-                # The step to another guard has passed this one by more than rounding.
-                order = order_passed(model, transition)
-        else:
-            crossed = crossed_by_landing(model, transition, known, own, was_on, before, now, order)
-            # A guard that fires both ways and was due already: this crossing takes the first one back.
-            crossed = crossed and not (direction == 0 and due[transition] == 1)
-        beyond = now == (direction if direction != 0 else before)
-        pushed = (
-            came == LANDED and left == mode and was_on and not crossed and beyond and order == BY_ACCELERATION
-        )
-        if pushed and due[transition] == 0 and model.marker[transition] == 0:
-            pushed = is_held(model, run, transition, mode, t, x, now, work)
-            # Another transition's reset left the state at rest: the guard's own reset must hold it again.
-            crossed = pushed and not own
-            rests = rests or (pushed and own and allowed(model, transition, t, x, work.scalar))
-            if pushed and own and direction != 0:
-                # Held on the guard, the state has not crossed it: another reset may yet push it through.
-                now = -direction
-        elif flat and direction != 0 and is_held(model, run, transition, mode, t, x, direction, work):
-            # A push that only begins: it has no acceleration yet.
-            rests = rests or allowed(model, transition, t, x, work.scalar)
-        pending = came == LANDED and due[transition] == 1 and beyond
-        if model.marker[transition] == 1 and came != FLOWED:
-            # A marker fires where the flow crosses it. After a jump it fires only if the flow has reached it
-            # together with the first jump, and has not been stopped there.
-            stopped = order == BY_STEP and zero[transition] != BY_STEP
-            crossed, pending = False, pending and was_on and order > 0 and not stopped
-            # A run that starts on the guard has crossed nothing, whichever side the next step shows.
-            flat = flat or (came == STARTED and order == BY_STEP)
-        side[transition], zero[transition] = 0 if flat else now, order
-        due[transition] = 1 if crossed or pending else 0
-        if due[transition] == 1 and chosen == NO_TRANSITION and allowed(model, transition, t, x, work.scalar):
+        if take_side(model, run, place, transition, arrival, known_sides, work):
+            rests = True
+        due = known_sides.due[transition] == 1
+        if due and chosen == NO_TRANSITION and allowed(model, transition, t, x, work.scalar):
             chosen = transition
     if chosen != NO_TRANSITION:
         return chosen

@@ -22,10 +22,13 @@ from hybrid.kernels.events.sides import (
     FLOWED,
     LANDED,
     STARTED,
+    Arrival,
+    Sides,
     beyond_at_start,
     end_instant,
     order_passed,
     side_of,
+    sides_of,
     take_sides,
 )
 from hybrid.kernels.types.codes import (
@@ -56,7 +59,7 @@ def enter(model, run, work):
         widen_scale(model, run, work)
     came = STARTED if left == NO_MODE else LANDED
     fired = run.last_fired if run.jumps > 0 else NO_TRANSITION
-    fires = take_sides(model, run, mode, t, run.y, came, left, fired, run.side, run.due, run.on_guard, work)
+    fires = take_sides(model, run, mode, t, run.y, Arrival(came, left, fired), sides_of(run), work)
     excluded = beyond_at_start(model, run, mode, t, run.y, work) if came == STARTED else NO_TRANSITION
     if excluded != NO_TRANSITION:
         run.locked = 1
@@ -118,13 +121,13 @@ def settle(model, run, first, out, work):
     """State ``(n,)`` after ``first`` and all jumps that it triggers at the same instant; returns the mode."""
     n, t = model.dimension, run.phase
     mode, fired = run.mode, first
-    side, due, zero = run.rehearsal[0], run.rehearsal[1], run.rehearsal[2]
-    for i in range(side.shape[0]):
-        side[i], due[i], zero[i] = run.side[i], run.due[i], run.on_guard[i]
+    tried = Sides(run.rehearsal[0], run.rehearsal[1], run.rehearsal[2])
+    for i in range(run.side.shape[0]):
+        tried.side[i], tried.due[i], tried.zero[i] = run.side[i], run.due[i], run.on_guard[i]
     for i in range(n):
         out[i], work.trial[i] = run.y[i], run.scale[i]
     for _ in range(MOST_JUMPS):
-        due[fired] = 0
+        tried.due[fired] = 0
         model.reset(fired, t, out, model.parameters, work.state)
         if model.target[fired] not in (NO_MODE, mode):
             carry_rounding(model, run, fired, t, out, work.state, work.reset_jacobian, work.settled)
@@ -134,7 +137,7 @@ def settle(model, run, first, out, work):
         left, mode = mode, model.target[fired]
         if mode == NO_MODE:
             break
-        fired = take_sides(model, run, mode, t, out, LANDED, left, fired, side, due, zero, work)
+        fired = take_sides(model, run, mode, t, out, Arrival(LANDED, left, fired), tried, work)
         if fired < 0:
             break
     for i in range(n):
@@ -178,48 +181,37 @@ def turns_back(model, run, transition, before, work):
     return acceleration * before > acceleration_rounding(model, run, transition, mode, t, run.y, work)
 
 
-@exported(INTEGER, Task, INTEGER, INTEGER, REAL)
-def first_in_order(task, fired, stop_cycle, stop_phase):
-    """Of the transitions due where the flow has reached the guard of ``fired``, the one listed first.
-
-    The run lands beyond the guards of all that are due. Notes whether order matters. None if ``fired`` may
-    not fire or has only touched, and no other is due: the run then goes on from this point. What comes before
-    the guard there, and what comes after it, may differ by rounding alone, so its side is left to the next
-    step: the crossing is behind, and cannot be found where it was refused.
-    """
-    _, model, _, run, record, work = task_of(task)
-    mode = run.mode
-    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+@njit(**KERNEL)
+def recall_sides(model, run):
+    """Give guards that cross here or later on the step the sides that they had before it."""
+    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
         other = model.outgoing[slot]
         if run.rehearsal[3, other] != 0:
-            # It crosses here or later on the step; it may have changed sides before.
             run.side[other] = run.rehearsal[3, other] if run.rehearsal[3, other] != NOT_KNOWN else 0
             run.rehearsal[3, other] = 0
-    before, direction = run.side[fired], model.direction[fired]
-    beyond = direction if direction != 0 else -before
-    land_beyond(model, run, fired, beyond, stop_cycle, stop_phase, work)
+
+
+@njit(**KERNEL)
+def has_only_touched(model, run, record, fired, side, work):
+    """Whether the flow has only touched the guard of ``fired``, with the ``side`` beyond it; then a grazing.
+
+    For a guard that is not affine, the change of sign is proved.
+    """
     t = run.phase
-    take_sides(model, run, mode, t, run.y, FLOWED, mode, NO_TRANSITION, run.side, run.due, run.on_guard, work)
-    # For a guard that is not affine, the change of sign is proved.
-    touched = (
-        model.affine_guard[fired] == 1
-        and turns_back(model, run, fired, -beyond, work)
-        and allowed(model, fired, t, run.y, work.scalar)
-    )
-    run.side[fired] = beyond
-    if run.on_guard[fired] == 0:
-        run.on_guard[fired] = order_passed(model, fired)
-    run.due[fired] = 0 if touched else 1
-    if touched:
-        value = guard_value(model, fired, t, run.y, work.scalar)
-        keep_grazing(model, run, record, fired, t, run.y, value, work)
-    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
-        other = model.outgoing[slot]
-        if run.due[other] == 1 and other != fired:
-            land_beyond(model, run, other, run.side[other], stop_cycle, stop_phase, work)
-    t = run.phase
-    chosen, first, together, matters = NO_TRANSITION, NO_TRANSITION, 0, False
-    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+    if model.affine_guard[fired] == 0 or not turns_back(model, run, fired, -side, work):
+        return False
+    if not allowed(model, fired, t, run.y, work.scalar):
+        return False
+    value = guard_value(model, fired, t, run.y, work.scalar)
+    keep_grazing(model, run, record, fired, t, run.y, value, work)
+    return True
+
+
+@njit(**KERNEL)
+def first_due(model, run, work):
+    """The first transition that is due and allowed; whether it matters which one fires first is counted."""
+    t, chosen, first, together, matters = run.phase, NO_TRANSITION, NO_TRANSITION, 0, False
+    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
         other = model.outgoing[slot]
         if run.due[other] == 0 or not allowed(model, other, t, run.y, work.scalar):
             continue
@@ -233,6 +225,36 @@ def first_in_order(task, fired, stop_cycle, stop_phase):
         elif not matters:
             matters = order_matters(model, run, first, other, work)
     run.order_mattered += 1 if matters else 0
+    return chosen
+
+
+@exported(INTEGER, Task, INTEGER, INTEGER, REAL)
+def first_in_order(task, fired, stop_cycle, stop_phase):
+    """Of the transitions due where the flow has reached the guard of ``fired``, the one listed first.
+
+    The run lands beyond the guards of all that are due. Notes whether order matters. None if ``fired`` may
+    not fire or has only touched, and no other is due: the run then goes on from this point. What comes before
+    the guard there, and what comes after it, may differ by rounding alone, so its side is left to the next
+    step: the crossing is behind, and cannot be found where it was refused.
+    """
+    _, model, _, run, record, work = task_of(task)
+    mode = run.mode
+    recall_sides(model, run)
+    direction = model.direction[fired]
+    beyond = direction if direction != 0 else -run.side[fired]
+    land_beyond(model, run, fired, beyond, stop_cycle, stop_phase, work)
+    flowed = Arrival(FLOWED, mode, NO_TRANSITION)
+    take_sides(model, run, mode, run.phase, run.y, flowed, sides_of(run), work)
+    touched = has_only_touched(model, run, record, fired, beyond, work)
+    run.side[fired] = beyond
+    if run.on_guard[fired] == 0:
+        run.on_guard[fired] = order_passed(model, fired)
+    run.due[fired] = 0 if touched else 1
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        other = model.outgoing[slot]
+        if run.due[other] == 1 and other != fired:
+            land_beyond(model, run, other, run.side[other], stop_cycle, stop_phase, work)
+    chosen = first_due(model, run, work)
     if touched or chosen == NO_TRANSITION:
         run.side[fired] = 0
     if chosen == NO_TRANSITION:
