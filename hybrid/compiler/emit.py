@@ -29,12 +29,13 @@ from hybrid.compiler.opaque import SLOPES, OpaqueFunction, check_plain
 from hybrid.compiler.parts import PARTS
 from hybrid.compiler.propagators.choice import propagator
 from hybrid.compiler.propagators.equations import Boundary, known_positive
+from hybrid.compiler.readers import readers
 from hybrid.compiler.steep import fields_at_crossings, steep_at_guards, steep_inside
 from hybrid.compiler.surfaces import surfaces
 from hybrid.compiler.taylor.loops import padded
 from hybrid.compiler.written import Written, beyond_guards, variational
 from hybrid.errors import ModelError
-from hybrid.kernels.types.codes import BY_FLOW, BY_GUARD, BY_NOTHING, WIDE
+from hybrid.kernels.types.codes import WIDE
 from hybrid.symbolic.continuity import jumps_of, may_be_abrupt, may_jump
 from hybrid.symbolic.derivatives import jacobian_of
 from hybrid.symbolic.expressions import JUMPING, ONE, ZERO
@@ -194,10 +195,7 @@ def _emitted(system: HybridSystem) -> Emitted:
         crossing=crossing,
         timed_guard=tuple(not _is_free(guard.expressions, (symbols.t,)) for guard in guards),
         timed_reset=tuple(not _is_free(reset.expressions, (symbols.t,)) for reset in resets),
-        read_by=tuple(
-            _readers(system, mode.name, field, guards, conditions, resets, symbols)
-            for mode, field in zip(system.modes, fields, strict=True)
-        ),
+        read_by=readers(system, fields, guards, conditions, resets, symbols),
         jumping_reset=tuple(
             reset.expressions is None or bool(jumps_of(reset.expressions, (symbols.t, *symbols.x)))
             for reset in resets
@@ -498,43 +496,6 @@ def _is_affine(written: Written, variables: Sequence[sympy.Symbol]) -> bool:
     jumps = nodes_of(JUMPING, *written.expressions)
     entries = [entry for row in written.jacobian for entry in row[: len(variables)]]
     return _is_free(jumps, variables) and _is_free(entries, variables)
-
-
-def _readers(
-    system: HybridSystem,
-    mode: str,
-    field: Written,
-    guards: Sequence[Written],
-    conditions: Sequence[Written],
-    resets: Sequence[Written],
-    symbols: Symbols,
-) -> tuple[int, ...]:
-    """By component: what in a mode depends on it besides its own rate and its own row of resets."""
-    leaving = [i for i, transition in enumerate(system.transitions) if transition.source == mode]
-    places = range(system.dimension)
-    decided = _components_in(each for i in leaving for each in (guards[i], conditions[i]))
-    moved = [_components_in([field], place) for place in places]
-    thrown = [_components_in((resets[i] for i in leaving), place) for place in places]
-
-    def reader(place: int) -> int:
-        symbol = symbols.x[place]
-        if decided is None or symbol in decided:
-            return BY_GUARD
-        others = [rows[other] for rows in (moved, thrown) for other in places if other != place]
-        return BY_FLOW if any(each is None or symbol in each for each in others) else BY_NOTHING
-
-    return tuple(map(reader, places))
-
-
-def _components_in(functions: Iterable[Written], row: int | None = None) -> set[sympy.Symbol] | None:
-    """The symbols in functions, or in one row of each; None if one could not be traced."""
-    found: set[sympy.Symbol] = set()
-    for each in functions:
-        if each.expressions is None:
-            return None
-        for expression in each.expressions if row is None else each.expressions[row : row + 1]:
-            found |= expression.free_symbols
-    return found
 
 
 def _is_free(expressions: Iterable[sympy.Expr] | None, variables: Sequence[sympy.Symbol]) -> bool:

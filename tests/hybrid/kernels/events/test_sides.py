@@ -8,7 +8,6 @@ import pytest
 
 from hybrid.kernels.events import sides
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP
-from hybrid.kernels.events.sides import FLOWED, LANDED
 from hybrid.kernels.types.codes import NO_TRANSITION
 from tests.hybrid.kernels.plain import plain
 
@@ -17,54 +16,6 @@ kernels = plain(sides)
 
 def integers(*values):
     return np.array(values, dtype=np.int64)
-
-
-class TestInherit:
-    """Transitions 0 to 2 leave the mode just left; 3 has just been entered, and watches surface 7."""
-
-    def inherited(self, surfaces, orientations, directions, side, due, zero, own_direction=1):
-        model = SimpleNamespace(
-            first_outgoing=integers(0, 0, 3),
-            outgoing=integers(0, 1, 2),
-            surface=integers(*surfaces, 7),
-            orientation=integers(*orientations, -1),
-            direction=integers(*directions, own_direction),
-        )
-        arrays = (integers(*side, 5), integers(*due, 5), integers(*zero, 5))
-        known = kernels.inherit(model, 1, 3, *arrays)
-        return known, *(int(each[3]) for each in arrays)
-
-    def test_of_no_guard_that_is_the_same(self):
-        found = self.inherited((1, 2, 3), (1, 1, 1), (1, 1, 1), (1, 1, 1), (1, 1, 1), (2, 2, 2))
-        assert found == (False, 0, 0, 0)
-
-    def test_the_side_is_turned_with_the_guard(self):
-        """The new guard is minus the old one, so that falling there is rising here."""
-        found = self.inherited((1, 7, 3), (1, 1, 1), (1, -1, 1), (1, 1, 1), (1, 1, 1), (0, 2, 3))
-        assert found == (True, -1, 1, 2)
-        # In the other direction the side is known all the same, but nothing is due.
-        found = self.inherited((1, 7, 3), (1, 1, 1), (1, 1, 1), (1, 1, 1), (1, 1, 1), (0, 2, 3))
-        assert found == (True, -1, 0, 2)
-        found = self.inherited((1, 7, 3), (1, -1, 1), (1, 1, 1), (1, 1, 1), (1, 1, 1), (0, 2, 3))
-        assert found == (True, 1, 1, 2)
-
-    def test_a_crossing_is_due_only_if_no_transition_has_fired_for_it(self):
-        for due, pending in (((1, 1, 0), 1), ((1, 0, 0), 0), ((0, 1, 0), 0)):
-            found = self.inherited((7, 7, 3), (-1, -1, 1), (1, 1, 1), (1, 1, 1), due, (1, 3, 9))
-            assert found == (True, 1, pending, 3)
-
-    @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-    def test_the_side_for_the_same_direction_counts(self, order):
-        """On a guard at rest each direction has its own near side."""
-        directions, side = np.array([1, -1])[list(order)], np.array([-1, 1])[list(order)]
-        found = self.inherited((7, 7, 3), (-1, -1, 1), (*directions, 1), (*side, 0), (0, 0, 0), (3, 3, 0))
-        assert found == (True, -1, 0, 3)
-
-    def test_an_unknown_side_is_no_side(self):
-        found = self.inherited((7, 7, 3), (-1, -1, 1), (1, -1, 1), (0, 1, 0), (0, 0, 0), (0, 0, 0))
-        assert found == (True, 0, 0, 0)
-        found = self.inherited((7, 7, 3), (-1, -1, 1), (-1, 1, 1), (1, 0, 0), (0, 0, 0), (0, 0, 0))
-        assert found == (True, 1, 0, 0)
 
 
 def crossed(direction, *, paired=0, known=True, own=False, was_on=False, before, now, order=0):
@@ -96,82 +47,6 @@ class TestLanding:
             expected = not own and before * now == -1
             assert crossed(0, before=before, now=now, own=own) == expected
             assert crossed(0, before=before, now=now, own=own, order=BY_SPEED) == expected
-
-
-class TestTakeSides:
-    """The second of three modes has the guards 1 and 2; the others have 0 and 3."""
-
-    def taken(
-        self, found, came, *, directions=(1, 1), before=(-1, -1), fired=NO_TRANSITION, left_behind=False
-    ):
-        """Side, due and order of the guards of the mode, which is entered from itself."""
-
-        def side_of(model, run, mode, transition, t, x, before, was_on, work):
-            assert (mode, t, x) == (1, 0.5, "x")
-            return found[transition - 1]
-
-        model = SimpleNamespace(
-            first_outgoing=integers(0, 1, 3, 4),
-            outgoing=integers(0, 1, 2, 3),
-            direction=integers(9, *directions, 9),
-            marker=integers(0, 0, 0, 0),
-            paired=integers(0, 0, 0, 0),
-            parameters=None,
-            field=lambda *given: None,
-        )
-        tested = plain(
-            sides,
-            side_of=side_of,
-            may_jump=lambda *given: False,
-            leaves_by_signs=lambda *given: False,
-            guard_speed=lambda *given: 3.0,
-            was_left_behind=lambda model, run, transition, t, x, speed, side, work: left_behind,
-            order_passed=lambda model, transition: BY_SPEED,
-            allowed=lambda model, transition, t, x, scalar: True,
-        )
-        side, due, zero = integers(7, *before, 7), integers(7, 0, 0, 7), integers(7, 0, 0, 7)
-        work = SimpleNamespace(field=None, gradient=None, scalar=None)
-        run = SimpleNamespace(last_transversality=9.0)
-        chosen = tested.take_sides(model, run, 1, 0.5, "x", came, 1, fired, side, due, zero, work)
-        # The guards of other modes are left alone.
-        assert [array[[0, 3]].tolist() for array in (side, due, zero)] == [[7, 7]] * 3
-        return chosen, *(array[1:3].tolist() for array in (side, due, zero))
-
-    def test_of_the_guards_of_the_mode_alone(self):
-        found = self.taken(((-1, 0), (-1, 0)), FLOWED)
-        assert found == (NO_TRANSITION, [-1, -1], [0, 0], [0, 0])
-        # One that the flow has crossed is due, the first of several fires.
-        assert self.taken(((-1, 0), (1, 0)), FLOWED) == (2, [-1, 1], [0, 1], [0, BY_SPEED])
-        assert self.taken(((1, BY_SPEED), (1, 0)), FLOWED) == (1, [1, 1], [1, 1], [BY_SPEED] * 2)
-
-    def test_a_guard_that_is_about_to_reach_where_it_has_fired(self):
-        """It lies before its guard by a finer rounding than that within which it has fired."""
-        for came in (FLOWED, LANDED):
-            found = self.taken(((-1, 0), (-1, 0)), came, directions=(0, -1), before=(1, 1), left_behind=True)
-            assert found == (NO_TRANSITION, [1, 1], [0, 0], [0, 0])
-        # Not a guard that is zero, nor one whose own reset has led here.
-        found = self.taken(
-            ((-1, BY_SPEED), (-1, 0)), FLOWED, directions=(0, 0), before=(1, 1), left_behind=True
-        )
-        assert found == (1, [-1, 1], [1, 0], [BY_SPEED, 0])
-        own = self.taken(
-            ((-1, 0), (1, 0)), LANDED, directions=(1, 1), before=(1, 1), fired=1, left_behind=True
-        )
-        assert own == (NO_TRANSITION, [-1, 1], [0, 0], [0, 0])
-
-    @pytest.mark.parametrize("direction", [1, -1])
-    def test_a_reset_that_stops_the_state_on_its_guard(self, direction):
-        """If only the next step shows the side, the state counts as not across its own guard."""
-        stopped = ((direction, BY_STEP), (direction, BY_STEP))
-        given = {"directions": (direction, direction), "before": (direction, direction)}
-        assert self.taken(stopped, LANDED, fired=1, **given)[1] == [-direction, direction]
-        assert self.taken(stopped, LANDED, fired=2, **given)[1] == [direction, -direction]
-        assert self.taken(stopped, LANDED, fired=3, **given)[1] == [direction, direction]
-        # Neither if its speed tells, nor if it fires both ways.
-        moving = ((direction, BY_SPEED), (direction, BY_SPEED))
-        assert self.taken(moving, LANDED, fired=1, **given)[1] == [direction, direction]
-        both = {"directions": (0, 0), "before": (direction, direction)}
-        assert self.taken(stopped, LANDED, fired=1, **both)[1] == [direction, direction]
 
 
 def test_at_the_end_of_an_instant_nothing_is_due_in_its_mode():
