@@ -12,11 +12,12 @@ from hybrid.errors import ArgumentError
 from hybrid.explorer.page import Page
 from hybrid.explorer.subject import Subject
 
-# A telephone shows a page without this line as if it were 980 pixels wide.
+# A telephone shows a page without this line as if it were 980 pixels wide. The location is what lets the page
+# change its own address.
 TEMPLATE = """
 {% extends base %}
 {% block preamble %}<meta name="viewport" content="width=device-width, initial-scale=1">{% endblock %}
-{% block contents %}{{ embed(roots.page) }}{% endblock %}
+{% block contents %}{{ embed(roots.page) }}{{ embed(roots.location) }}{% endblock %}
 """
 
 
@@ -63,7 +64,7 @@ def started(subject: Subject, port: int, address: str) -> tuple[Server, str]:
             made.close()
 
         document.on_session_destroyed(closed)
-        framed = pn.Template(TEMPLATE)
+        framed = pn.Template(TEMPLATE, location=True)
         framed.add_panel("page", made.view)
         return framed
 
