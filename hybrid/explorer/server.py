@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import threading
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import panel as pn
@@ -42,6 +43,15 @@ class Server:
             pass
 
 
+def read_query(arguments: Mapping[str, Sequence[bytes]]) -> dict[str, str]:
+    """The parts of an address as text; Tornado reads their names as if they were Latin-1."""
+    return {
+        name.encode("latin-1").decode(errors="replace"): values[0].decode(errors="replace")
+        for name, values in arguments.items()
+        if values
+    }
+
+
 def started(subject: Subject, port: int, address: str) -> tuple[Server, str]:
     """A server of the page and its address.
 
@@ -55,7 +65,7 @@ def started(subject: Subject, port: int, address: str) -> tuple[Server, str]:
 
     def page() -> Any:
         document = pn.state.curdoc
-        query = {name: values[0].decode() for name, values in pn.state.session_args.items() if values}
+        query = read_query(pn.state.session_args)
         made = Page(subject, query, document.add_next_tick_callback)
         pages.append(made)
 
