@@ -71,9 +71,9 @@ class Page:
         self.view = arranged(subject.system.name or "Hybrid system", self.widgets, figures)
         self.refresh()
 
-    def close(self) -> None:
-        """End the work of the page."""
-        self.worker.close()
+    def close(self, *, wait: bool = True) -> None:
+        """End the work of the page; ``wait`` until it has ended."""
+        self.worker.close(wait=wait)
 
     # What a visitor does.
 

@@ -71,7 +71,8 @@ def started(subject: Subject, port: int, address: str) -> tuple[Server, str]:
 
         def closed(_: Any) -> None:
             pages.remove(made)
-            made.close()
+            # The thread of the server must not wait: other pages are open, and the worker may wait for it.
+            made.close(wait=False)
 
         document.on_session_destroyed(closed)
         framed = pn.Template(TEMPLATE, location=True)
