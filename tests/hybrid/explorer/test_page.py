@@ -226,6 +226,28 @@ def test_the_diagram_keeps_while_its_parameter_moves(opened):
     assert len(page.board.figures.diagram.largest.data["parameter"]) == 12
 
 
+def test_the_page_has_the_limits_of_an_address(opened):
+    page = opened(models.impact_oscillator)
+    before = page.scene
+    for field, value in (("points", 10**9), ("window", -1.0), ("level", float("nan")), ("columns", 10**9)):
+        page.change(**{field: value})
+        assert page.scene is before
+        assert f"{field} must be" in page.widgets.words.object
+    page.change(points=100)
+    assert page.scene.points == 100
+    assert "must be" not in page.widgets.words.object
+
+
+def test_the_ends_of_the_diagram_are_typed_one_after_the_other(opened):
+    page = opened(models.impact_oscillator)
+    page.change(low=5.0)
+    assert "The diagram needs from" in page.widgets.words.object
+    page.change(high=6.0)
+    assert page.worker.wait(60)
+    assert (page.scene.low, page.scene.high) == (5.0, 6.0)
+    assert min(page.board.figures.diagram.largest.data["parameter"]) == 5.0
+
+
 def test_a_system_without_parameters_or_jumps(opened):
     system = HybridSystem(state=("x", "v"), modes=[Mode("free", lambda t, x, p: (x.v, -x.x))])
     page = Page(subject(system, "", (1.0, 0.0)), {}, lambda act: act())
