@@ -248,6 +248,14 @@ def test_the_ends_of_the_diagram_are_typed_one_after_the_other(opened):
     assert min(page.board.figures.diagram.largest.data["parameter"]) == 5.0
 
 
+def test_a_click_beyond_a_slider_moves_its_end(opened):
+    page = opened(models.impact_oscillator)
+    page.move("w", 9.0)
+    assert page.worker.wait(60)
+    slider = page.widgets.sliders["w"]
+    assert (slider.value, slider.end) == (9.0, 9.0)
+
+
 def test_a_system_without_parameters_or_jumps(opened):
     system = HybridSystem(state=("x", "v"), modes=[Mode("free", lambda t, x, p: (x.v, -x.x))])
     page = Page(subject(system, "", (1.0, 0.0)), {}, lambda act: act())
