@@ -115,8 +115,10 @@ class Board:
         self._draw_orbit(orbit, arc, points_of_orbit(self.subject, scene, orbit, arc))
         period = with_unit(f"{orbit.period:.6g}", self.subject.system.units.get("t"))
         moduli = np.sort(np.abs(orbit.multipliers))[::-1]
-        # An unforced orbit has the multiplier 1 of its phase.
-        largest = moduli[0] if self.subject.is_forced else float(np.delete(moduli, _nearest_one(moduli))[0])
+        if not self.subject.is_forced:
+            # An unforced orbit has the multiplier 1 of its phase; of one state there is no other.
+            moduli = np.delete(moduli, _nearest_one(moduli))
+        largest = float(moduli.max(initial=0.0))
         kind = "stable" if largest < 1.0 else "not stable"
         self.words["orbit"] = (
             f"Orbit of period {period} with {counted(len(orbit.signature), 'jump')}: "

@@ -226,6 +226,47 @@ def test_the_diagram_keeps_while_its_parameter_moves(opened):
     assert len(page.board.figures.diagram.largest.data["parameter"]) == 12
 
 
+RELAY = HybridSystem(
+    state=("q",),
+    parameters={"d": 0.5},
+    modes=[Mode("up", lambda t, x, p: (1.0,)), Mode("down", lambda t, x, p: (-1.0,))],
+    transitions=[
+        Transition("up", "down", Guard(lambda t, x, p: x.q - p.d, +1)),
+        Transition("down", "up", Guard(lambda t, x, p: x.q + p.d, -1)),
+    ],
+)
+FALL = HybridSystem(
+    state=("q", "v"),
+    modes=[Mode("fall", lambda t, x, p: (x.v, -9.81))],
+    transitions=[Transition("fall", None, Guard(lambda t, x, p: x.q, -1), name="ground")],
+)
+
+
+def test_an_unforced_orbit_of_one_state_is_told(opened):
+    """Its only multiplier is that of the phase."""
+    page = opened(lambda: RELAY, x0=(0.0,), mode="up")
+    page.widgets.switches["orbit"].value = True
+    assert page.worker.wait(60)
+    assert "Orbit of period 2 " in page.board.words["orbit"]
+    assert "stable" in page.board.words["orbit"]
+
+
+def test_basins_need_a_plane(opened):
+    page = opened(lambda: RELAY, x0=(0.0,), mode="up")
+    page.widgets.switches["basins"].value = True
+    assert page.worker.wait(60)
+    assert "must be two components" in page.board.words["basins"]
+
+
+def test_a_run_that_ends_has_no_orbit(opened):
+    page = opened(lambda: FALL, x0=(1.0, 0.0))
+    page.widgets.switches["orbit"].value = True
+    assert page.worker.wait(60)
+    assert "the arc ends before it can come back" in page.board.words["orbit"]
+    with pytest.raises(ArgumentError, match="there is no exponents yet"):
+        page.saved("exponents", "png")
+
+
 def test_the_page_has_the_limits_of_an_address(opened):
     page = opened(models.impact_oscillator)
     before = page.scene
