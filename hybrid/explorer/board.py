@@ -160,11 +160,12 @@ class Board:
             self.calls["diagram"] = (diagram_call(self.subject, scene),)
         self.figures.diagram.add(scene.over, chart)
         self.progress = (outcome.part + 1) / len(outcome.job.parts)
-        failed = int((chart.status.values != StatusCode.SUCCESS).sum())
+        early = chart.status.values != StatusCode.SUCCESS
+        failed = int(early.sum())
         before = 0 if outcome.part == 0 else self.results.get("failed columns", 0)
         self.results["failed columns"] = before + failed
         if before + failed:
-            message = next((str(each) for each in chart.message.values if str(each)), "")
+            message = next((str(each) for each in chart.message.values[early] if str(each)), "")
             self.results["why"] = message or self.results.get("why", "")
             self.words["diagram"] = (
                 f"Diagram: {counted(before + failed, 'column')} ended early. {self.results['why']}"

@@ -12,7 +12,10 @@ import models
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 from hybrid.errors import ArgumentError
 from hybrid.explorer.page import Page
+from hybrid.explorer.pictures import diagram_call
 from hybrid.explorer.subject import subject
+from hybrid.explorer.worker import Job, Outcome
+from hybrid.status import StatusCode
 
 IMPORTS = "import hybrid\nimport lyapunov\nimport matplotlib.pyplot as plt\nimport numpy as np\n\n"
 
@@ -295,6 +298,18 @@ def test_a_click_beyond_a_slider_moves_its_end(opened):
     assert page.worker.wait(60)
     slider = page.widgets.sliders["w"]
     assert (slider.value, slider.end) == (9.0, 9.0)
+
+
+def test_words_about_columns_are_those_of_a_column_that_ended(opened):
+    """A column that reached its end may carry a remark; it is not why another one ended early."""
+    page = opened(models.impact_oscillator)
+    chart = diagram_call(page.subject, page.scene).result(progress=False)
+    chart["message"] = chart.message.astype(object)
+    chart.message[:2] = ["a remark", "the cause"]
+    chart.status[1] = StatusCode.NON_FINITE
+    job = Job("diagram", "another", (lambda: None,))
+    page.show(Outcome(job, 0, (page.scene, chart), "", 0.0))
+    assert page.board.words["diagram"] == "Diagram: 1 column ended early. the cause"
 
 
 def test_a_system_without_parameters_or_jumps(opened):
