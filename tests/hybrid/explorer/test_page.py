@@ -312,6 +312,13 @@ def test_words_about_columns_are_those_of_a_column_that_ended(opened):
     assert page.board.words["diagram"] == "Diagram: 1 column ended early. the cause"
 
 
+def test_a_picture_that_is_not_there_can_be_held(opened):
+    page = opened(models.vibroimpact, query={"p.omega": "0", "columns": "2"})
+    assert page.board.live is None
+    page.hold(True)
+    page.hold(False)
+
+
 def test_a_system_without_parameters_or_jumps(opened):
     system = HybridSystem(state=("x", "v"), modes=[Mode("free", lambda t, x, p: (x.v, -x.x))])
     page = Page(subject(system, "", (1.0, 0.0)), {}, lambda act: act())
