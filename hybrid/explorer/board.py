@@ -115,8 +115,10 @@ class Board:
         self._draw_orbit(orbit, arc, points_of_orbit(self.subject, scene, orbit, arc))
         period = with_unit(f"{orbit.period:.6g}", self.subject.system.units.get("t"))
         moduli = np.sort(np.abs(orbit.multipliers))[::-1]
-        # An unforced orbit has the multiplier 1 of its phase.
-        largest = moduli[0] if self.subject.is_forced else float(np.delete(moduli, _nearest_one(moduli))[0])
+        if not self.subject.is_forced:
+            # An unforced orbit has the multiplier 1 of its phase; of one state there is no other.
+            moduli = np.delete(moduli, _nearest_one(moduli))
+        largest = float(moduli.max(initial=0.0))
         kind = "stable" if largest < 1.0 else "not stable"
         self.words["orbit"] = (
             f"Orbit of period {period} with {counted(len(orbit.signature), 'jump')}: "
@@ -158,11 +160,12 @@ class Board:
             self.calls["diagram"] = (diagram_call(self.subject, scene),)
         self.figures.diagram.add(scene.over, chart)
         self.progress = (outcome.part + 1) / len(outcome.job.parts)
-        failed = int((chart.status.values != StatusCode.SUCCESS).sum())
+        early = chart.status.values != StatusCode.SUCCESS
+        failed = int(early.sum())
         before = 0 if outcome.part == 0 else self.results.get("failed columns", 0)
         self.results["failed columns"] = before + failed
         if before + failed:
-            message = next((str(each) for each in chart.message.values if str(each)), "")
+            message = next((str(each) for each in chart.message.values[early] if str(each)), "")
             self.results["why"] = message or self.results.get("why", "")
             self.words["diagram"] = (
                 f"Diagram: {counted(before + failed, 'column')} ended early. {self.results['why']}"

@@ -76,7 +76,7 @@ def model_of(given: str) -> tuple[HybridSystem, str]:
         raise ArgumentError(f"The model must be named as {WANTED}; got {given!r}.")
     found, opening = _from_file(module, name) if module.endswith(".py") else _from_module(module, name)
     if isinstance(found, HybridSystem):
-        return found, f"{opening}\nsystem = {name}\n"
+        return found, opening if name == "system" else f"{opening}\nsystem = {name}\n"
     if not callable(found):
         raise ArgumentError(f"{given} must be a HybridSystem or a factory of one; got {found!r}.")
     try:
@@ -110,7 +110,12 @@ def _from_file(file: str, name: str) -> tuple[Any, str]:
 
 def _member(module: str, name: str, members: dict[str, Any]) -> Any:
     if name not in members:
-        public = [each for each, value in members.items() if not each.startswith("_") and callable(value)]
+        models = {
+            each: value
+            for each, value in members.items()
+            if isinstance(value, HybridSystem) or (callable(value) and not isinstance(value, type))
+        }
+        public = [each for each in models if not each.startswith("_")]
         raise ArgumentError(unknown_name(f"{module}:", name, public, "Names"))
     return members[name]
 

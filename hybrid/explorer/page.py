@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import panel as pn
 
-from hybrid.errors import HybridError
+from hybrid.errors import ArgumentError, HybridError
 from hybrid.explorer.board import Board
 from hybrid.explorer.events import described_jump
 from hybrid.explorer.figures.all import Figures
@@ -25,7 +25,7 @@ from hybrid.explorer.pictures import (
     orbit_job,
 )
 from hybrid.explorer.saved import saved_figure
-from hybrid.explorer.scene import from_query, to_query
+from hybrid.explorer.scene import checks_of, from_query, over_parameter, to_query
 from hybrid.explorer.subject import Subject
 from hybrid.explorer.widgets import Widgets
 from hybrid.explorer.worker import Outcome, Worker
@@ -71,9 +71,9 @@ class Page:
         self.view = arranged(subject.system.name or "Hybrid system", self.widgets, figures)
         self.refresh()
 
-    def close(self) -> None:
-        """End the work of the page."""
-        self.worker.close()
+    def close(self, *, wait: bool = True) -> None:
+        """End the work of the page; ``wait`` until it has ended."""
+        self.worker.close(wait=wait)
 
     # What a visitor does.
 
@@ -88,15 +88,22 @@ class Page:
 
     def change(self, **changed: Any) -> None:
         """Change the scene, and have what depends on it computed."""
+        checks = checks_of(self.subject)
+        self.say("address", "")
+        try:
+            for name in checks.keys() & changed.keys():
+                changed[name] = checks[name](name, str(changed[name]))
+        except ArgumentError as error:
+            self.say("address", str(error))
+            self.widgets.follow(self.scene)
+            return
         scene = self.scene.with_(**changed)
         if "over" in changed:
-            low, high = self.subject.ranges[scene.over]
-            scene = scene.with_(low=low, high=high)
-        self.board.words["address"] = ""
-        if not scene.low < scene.high:
-            self.say("address", f"The diagram needs from < to; got {scene.low:g} and {scene.high:g}.")
-            return
+            scene = over_parameter(self.subject, scene, scene.over)
         self.scene = scene
+        if not scene.low < scene.high:
+            # One end is typed before the other: the diagram waits until both are there.
+            self.say("address", f"The diagram needs from < to; got {scene.low:g} and {scene.high:g}.")
         self.board.figures.choose(scene)
         self.refresh()
 
@@ -189,13 +196,14 @@ class Page:
         if "orbit" in on:
             jobs.append(orbit_job(subject, scene, self._last))
         jobs.append(exponents_job(subject, scene))
-        if scene.over:
-            if "branch" in on:
-                jobs.append(branch_job(subject, scene, self._last))
-            jobs.append(diagram_job(subject, scene))
+        has_range = bool(scene.over) and scene.low < scene.high
+        if has_range and "branch" in on:
+            jobs.append(branch_job(subject, scene, self._last))
         if "basins" in on and self.board.live is not None:
             # Before the diagram, which takes longest; a drag does not wait for either.
-            jobs.insert(-1, basins_job(subject, scene, *self.board.figures.section.plane))
+            jobs.append(basins_job(subject, scene, *self.board.figures.section.plane))
+        if has_range:
+            jobs.append(diagram_job(subject, scene))
         self.worker.want(jobs)
 
     def _keep(self, live: Live) -> None:

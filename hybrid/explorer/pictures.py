@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 
 import lyapunov
+from hybrid.errors import ArgumentError
 from hybrid.explorer.calls import Call, Written
 from hybrid.explorer.scene import BEGIN, JUMPS, PERIOD, Scene
 from hybrid.explorer.subject import Subject
@@ -258,7 +259,7 @@ def _recurrence(arc: HybridArc) -> tuple[tuple[float, ...], str, float]:
     there is none, where it is nearest after it has gone away.
     """
     begin = int(np.searchsorted(arc.t, arc.t[0] + (arc.t[-1] - arc.t[0]) / 2))
-    begin = min(begin, len(arc.t) - 2)
+    begin = max(0, min(begin, len(arc.t) - 2))
     x, size = arc.x[begin], np.ptp(arc.x, axis=0)
     size = np.where(size > 0.0, size, 1.0)
     times = np.linspace(arc.t[begin], arc.t[-1], 2000)[1:]
@@ -271,7 +272,12 @@ def _recurrence(arc: HybridArc) -> tuple[tuple[float, ...], str, float]:
         nearest = back + int(np.argmin(away[back : back + int(np.argmax(again)) if again.any() else None]))
     else:
         nearest = left + int(np.argmin(away[left:]))
-    return tuple(map(float, x)), str(arc.mode[begin]), float(times[nearest] - arc.t[begin])
+    period = float(times[nearest] - arc.t[begin])
+    if not period > 0.0:
+        raise ArgumentError(
+            "Orbit: the arc ends before it can come back. Start elsewhere, or show more of it."
+        )
+    return tuple(map(float, x)), str(arc.mode[begin]), period
 
 
 def branch_job(subject: Subject, scene: Scene, last: Callable[[], Live]) -> Job:
@@ -293,6 +299,8 @@ def basins_call(
     subject: Subject, scene: Scene, across: tuple[float, float], up: tuple[float, float], count: int
 ) -> Call:
     """The call that paints the basins over the plane of the section."""
+    if scene.across == scene.up:
+        raise ArgumentError("Basins: across and up must be two components; choose another one.")
     over: dict[str, Any] = dict(scene.x0)
     for name, (low, high) in ((scene.across, across), (scene.up, up)):
         text = f"np.linspace({low!r}, {high!r}, {count})"
@@ -304,13 +312,16 @@ def basins_call(
 
 def basins_job(subject: Subject, scene: Scene, across: tuple[float, float], up: tuple[float, float]) -> Job:
     """Basins on a coarse grid, then on a fine one."""
-    calls = [basins_call(subject, scene, across, up, count) for count in GRIDS]
 
-    def part(call: Call) -> Callable[[], Any]:
-        return lambda: (scene, call, call.result(progress=False))
+    def part(count: int) -> Callable[[], Any]:
+        def painted() -> Any:
+            call = basins_call(subject, scene, across, up, count)
+            return scene, call, call.result(progress=False)
+
+        return painted
 
     key = (_key(scene, only=("values", "x0", "across", "up")), across, up)
-    return Job("basins", key, tuple(map(part, calls)))
+    return Job("basins", key, tuple(map(part, GRIDS)))
 
 
 def _key(scene: Scene, *, only: tuple[str, ...] = (), without: tuple[str, ...] = ()) -> Hashable:

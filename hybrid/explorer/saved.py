@@ -31,6 +31,9 @@ def saved_figure(
     made = Figure(figsize=(6.4, 4.8), layout="constrained")
     ax, across, up = made.subplots(), scene.across, scene.up
     found: Any = results.get(picture)
+    if picture == "exponents" and found is not None and not found.intervals:
+        # A run that ended before its first interval has no history to draw.
+        found = None
     if live is None or (picture in ("exponents", "orbit", "branch", "basins") and found is None):
         raise ArgumentError(f"Save: there is no {picture} yet. Switch it on, or wait until it is drawn.")
     match picture:

@@ -97,23 +97,32 @@ def first_scene(subject: Subject) -> Scene:
     )
 
 
+def over_parameter(subject: Subject, scene: Scene, name: str) -> Scene:
+    """The scene with the diagram over a parameter, from end to end of its slider."""
+    low, high = subject.ranges.get(name, (0.0, 1.0))
+    return scene.with_(over=name, low=low, high=high)
+
+
 def _moved(subject: Subject, name: str) -> float:
     low, high = subject.ranges[name]
     return 0.75 * high + 0.25 * low
 
 
-# Each part of an address: what a text must be.
+# What the text of a value must be: of a part of an address, or of what is typed.
 Check = Callable[[str, str], Any]
 
 
 def to_query(subject: Subject, scene: Scene) -> dict[str, str]:
     """The parts of an address that lead back to a scene: what differs from the first one."""
-    first = first_scene(subject)
+    opened = first_scene(subject)
+    first = over_parameter(subject, opened, scene.over)
     query = {f"p.{name}": repr(value) for name, value in scene.values.items() if value != first.values[name]}
     query |= {f"x.{name}": repr(value) for name, value in scene.x0.items() if value != first.x0[name]}
     for field in attrs.fields(Scene):
         value = getattr(scene, field.name)
-        if field.name not in ("values", "x0") and value != getattr(first, field.name):
+        # The ends of the diagram are compared with those of its parameter, which is told where it is another.
+        known = opened.over if field.name == "over" else getattr(first, field.name)
+        if field.name not in ("values", "x0") and value != known:
             query[field.name] = value if isinstance(value, str) else repr(value)
     return query
 
@@ -122,28 +131,32 @@ def from_query(subject: Subject, query: Mapping[str, str]) -> tuple[Scene, list[
     """The scene of an address, and what in it was not understood. Nothing in it is evaluated."""
     scene, refused = first_scene(subject), []
     checks = checks_of(subject)
-    for name, text in query.items():
+    # The parameter of the diagram decides its ends, unless they are given too.
+    for name, text in sorted(query.items(), key=lambda part: part[0] != "over"):
         try:
             if name[:2] == "p.":
-                arguments.known("Address: Parameter", name[2:], subject.values, "Parameters")
+                arguments.known("Parameter", name[2:], subject.values, "Parameters")
                 scene = scene.with_(values={**scene.values, name[2:]: _number(name, text)})
             elif name[:2] == "x.":
-                arguments.known("Address: Component", name[2:], scene.x0, "State components")
+                arguments.known("Component", name[2:], scene.x0, "State components")
                 scene = scene.with_(x0={**scene.x0, name[2:]: _number(name, text)})
             else:
-                check = checks[arguments.known("Address: Part", name, checks, "Parts")]
-                scene = scene.with_(**{name: check(name, text)})
+                check = checks[arguments.known("Part", name, checks, "Parts")]
+                value = check(name, text)
+                if name == "over":
+                    scene = over_parameter(subject, scene, value)
+                else:
+                    scene = scene.with_(**{name: value})
         except ArgumentError as error:
-            refused.append(str(error))
+            refused.append(f"Address: {error}")
     if not scene.low < scene.high:
         refused.append(f"Address: low must be below high; got {scene.low} and {scene.high}.")
-        low, high = subject.ranges.get(scene.over, (0.0, 1.0))
-        scene = scene.with_(low=low, high=high)
+        scene = over_parameter(subject, scene, scene.over)
     return scene, refused
 
 
 def checks_of(subject: Subject) -> dict[str, Check]:
-    """How the text of each part of an address is read."""
+    """How the text of each value is read, in an address and on the page: both have the same limits."""
     names = subject.system.state_names
     component = _one_of(names)
     return {
@@ -178,18 +191,18 @@ def _number(name: str, text: str) -> float:
     except ValueError:
         value = float("nan")
     if not isfinite(value):
-        raise arguments.refusal(f"Address: {name}", "be a finite number", text)
+        raise arguments.refusal(name, "be a finite number", text)
     return value
 
 
 def _one_of(allowed: tuple[str, ...]) -> Check:
-    return lambda name, text: arguments.known(f"Address: {name}", text, allowed, "Allowed")
+    return lambda name, text: arguments.known(name, text, allowed, "Allowed")
 
 
 def _count(least: int, most: int) -> Check:
     def check(name: str, text: str) -> int:
         if not (text.isdecimal() and text.isascii() and least <= int(text[:18]) <= most):
-            raise arguments.refusal(f"Address: {name}", f"be a whole number from {least} to {most}", text)
+            raise arguments.refusal(name, f"be a whole number from {least} to {most}", text)
         return int(text)
 
     return check
@@ -199,7 +212,7 @@ def _up_to(most: float) -> Check:
     def check(name: str, text: str) -> float:
         value = _number(name, text)
         if not 0.0 < value <= most:
-            raise arguments.refusal(f"Address: {name}", f"be above 0 and at most {most:g}", text)
+            raise arguments.refusal(name, f"be above 0 and at most {most:g}", text)
         return value
 
     return check

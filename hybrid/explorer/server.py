@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import threading
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import panel as pn
@@ -12,11 +13,12 @@ from hybrid.errors import ArgumentError
 from hybrid.explorer.page import Page
 from hybrid.explorer.subject import Subject
 
-# A telephone shows a page without this line as if it were 980 pixels wide.
+# A telephone shows a page without this line as if it were 980 pixels wide. The location is what lets the page
+# change its own address.
 TEMPLATE = """
 {% extends base %}
 {% block preamble %}<meta name="viewport" content="width=device-width, initial-scale=1">{% endblock %}
-{% block contents %}{{ embed(roots.page) }}{% endblock %}
+{% block contents %}{{ embed(roots.page) }}{{ embed(roots.location) }}{% endblock %}
 """
 
 
@@ -41,6 +43,15 @@ class Server:
             pass
 
 
+def read_query(arguments: Mapping[str, Sequence[bytes]]) -> dict[str, str]:
+    """The parts of an address as text; Tornado reads their names as if they were Latin-1."""
+    return {
+        name.encode("latin-1").decode(errors="replace"): values[0].decode(errors="replace")
+        for name, values in arguments.items()
+        if values
+    }
+
+
 def started(subject: Subject, port: int, address: str) -> tuple[Server, str]:
     """A server of the page and its address.
 
@@ -54,16 +65,17 @@ def started(subject: Subject, port: int, address: str) -> tuple[Server, str]:
 
     def page() -> Any:
         document = pn.state.curdoc
-        query = {name: values[0].decode() for name, values in pn.state.session_args.items() if values}
+        query = read_query(pn.state.session_args)
         made = Page(subject, query, document.add_next_tick_callback)
         pages.append(made)
 
         def closed(_: Any) -> None:
             pages.remove(made)
-            made.close()
+            # The thread of the server must not wait: other pages are open, and the worker may wait for it.
+            made.close(wait=False)
 
         document.on_session_destroyed(closed)
-        framed = pn.Template(TEMPLATE)
+        framed = pn.Template(TEMPLATE, location=True)
         framed.add_panel("page", made.view)
         return framed
 

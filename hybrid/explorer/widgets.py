@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from html import escape
 from io import StringIO
+from math import isfinite
 from typing import Any, Protocol
 
 import panel as pn
@@ -128,6 +129,8 @@ class Widgets:
         """Show the values of a scene, without changing it again."""
         self.following = True
         try:
+            for name, value in scene.values.items():
+                self._reach(name, value)
             both = ((scene.values, self.sliders), (scene.values, self.fields), (scene.x0, self.starts))
             for given, widgets in both:
                 for name, value in given.items():
@@ -174,13 +177,18 @@ class Widgets:
 
         def moved(attribute: str, old: float, new: float | None) -> None:
             if not self.following and new is not None:
-                # A value that is typed may lie beyond the ends.
-                slider.start, slider.end = min(slider.start, new), max(slider.end, new)
+                self._reach(name, new)
                 self.acts.move(name, new)
 
         slider.on_change("value", moved)
         field.on_change("value", moved)
         self.sliders[name], self.fields[name] = slider, field
+
+    def _reach(self, name: str, value: float) -> None:
+        """Move an end of a slider to a value beyond it: one that is typed, or clicked at."""
+        slider = self.sliders[name]
+        if not slider.start <= value <= slider.end and isfinite(value):
+            slider.start, slider.end = min(slider.start, value), max(slider.end, value)
 
     def _choices(self, names: list[str], scene: Scene) -> dict[str, Any]:
         modes = dict.fromkeys(each.part_of or each.name for each in self.subject.system.modes)

@@ -109,13 +109,14 @@ class Worker:
         with self.changed:
             self.done.pop(picture, None)
 
-    def close(self) -> None:
-        """End the thread."""
+    def close(self, *, wait: bool = True) -> None:
+        """End the thread; ``wait`` until it has ended."""
         with self.changed:
             self.closed = True
             self.stop.set()
             self.changed.notify_all()
-        self.thread.join()
+        if wait:
+            self.thread.join()
 
     def _next(self) -> Job | None:
         """The first job that has parts left."""

@@ -402,8 +402,10 @@ class Shooting:
             return (
                 f"all states are below the atol of the solver, {self.solver.atol:.3g}, and so not controlled"
             )
-        # A component that is below the solver's absolute tolerance throughout counts as zero.
-        nothing = np.where(shot.magnitude <= self.solver.atol, self.solver.atol, 0.0)
+        # A component that is throughout below the solver's absolute tolerance, or below what the rounding of
+        # the others makes of it, counts as zero.
+        zero = np.maximum(self.solver.atol, shot.rounding)
+        nothing = np.where(shot.magnitude <= zero, zero, 0.0)
         if not shot.closes(tolerance, shot.rounding, nothing):
             return f"the residual is {length(shot.gap):.3g} after {iterations} iterations"
         noise = np.maximum(ROUNDING_OF_GAP * EPSILON * shot.magnitude, nothing)

@@ -121,7 +121,7 @@ class ArcFigures:
         if not held:
             empty(self.held)
             return
-        parts = [each.data for each in self.curves.values()]
+        parts = [each.data for each in (self.held, *self.curves.values())]
         self.held.data = {
             name: np.concatenate([np.asarray(part[name], dtype=float) for part in parts])
             for name in ("t", *self.states.components)

@@ -170,6 +170,18 @@ def test_a_click_starts_an_orbit(page):
     assert errors(page) == []
 
 
+def test_share_puts_the_scene_into_the_address(page, explorer):
+    run(page, "slider('omega (').value = 7.5")
+    wait(page, "return script() && script().includes(\"'omega': 7.5\")")
+    run(page, "button('Share').click()")
+    wait(page, "return document.location.search === '?p.omega=7.5'")
+    page.get(page.current_url)
+    wait(page, "return slider('omega (').value === 7.5")
+    page.get(explorer.url + "?p.omega=7.6&section=nonsense&level=%ff")
+    wait(page, "return slider('omega (').value === 7.6")
+    wait(page, "return all(document, '[role=status]', []).some((e) => e.textContent.includes('nonsense'))")
+
+
 def test_the_script_runs_and_gives_the_same_numbers(page):
     run(page, "button('Orbit near here').click()")
     text = wait(page, "const text = script(); return text && text.includes('orbit = ') ? text : null")

@@ -51,6 +51,17 @@ def test_a_system_or_factory_of_a_file(own, name):
     np.testing.assert_array_equal(arcs[0].x, arcs[1].x)
 
 
+def test_the_script_names_the_system_once(own):
+    """A file that calls its model system needs no second name."""
+    _, text = model_of(f"{own}:system")
+    assert "system = system" not in text
+
+
+def test_a_system_of_a_file_is_among_the_names(own):
+    with pytest.raises(ArgumentError, match="'system'"):
+        model_of(f"{own}:sistem")
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [

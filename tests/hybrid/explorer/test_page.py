@@ -12,7 +12,10 @@ import models
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 from hybrid.errors import ArgumentError
 from hybrid.explorer.page import Page
+from hybrid.explorer.pictures import diagram_call
 from hybrid.explorer.subject import subject
+from hybrid.explorer.worker import Job, Outcome
+from hybrid.status import StatusCode
 
 IMPORTS = "import hybrid\nimport lyapunov\nimport matplotlib.pyplot as plt\nimport numpy as np\n\n"
 
@@ -224,6 +227,96 @@ def test_the_diagram_keeps_while_its_parameter_moves(opened):
     page.move("c", 0.11)
     assert page.worker.wait(60)
     assert len(page.board.figures.diagram.largest.data["parameter"]) == 12
+
+
+RELAY = HybridSystem(
+    state=("q",),
+    parameters={"d": 0.5},
+    modes=[Mode("up", lambda t, x, p: (1.0,)), Mode("down", lambda t, x, p: (-1.0,))],
+    transitions=[
+        Transition("up", "down", Guard(lambda t, x, p: x.q - p.d, +1)),
+        Transition("down", "up", Guard(lambda t, x, p: x.q + p.d, -1)),
+    ],
+)
+FALL = HybridSystem(
+    state=("q", "v"),
+    modes=[Mode("fall", lambda t, x, p: (x.v, -9.81))],
+    transitions=[Transition("fall", None, Guard(lambda t, x, p: x.q, -1), name="ground")],
+)
+
+
+def test_an_unforced_orbit_of_one_state_is_told(opened):
+    """Its only multiplier is that of the phase."""
+    page = opened(lambda: RELAY, x0=(0.0,), mode="up")
+    page.widgets.switches["orbit"].value = True
+    assert page.worker.wait(60)
+    assert "Orbit of period 2 " in page.board.words["orbit"]
+    assert "stable" in page.board.words["orbit"]
+
+
+def test_basins_need_a_plane(opened):
+    page = opened(lambda: RELAY, x0=(0.0,), mode="up")
+    page.widgets.switches["basins"].value = True
+    assert page.worker.wait(60)
+    assert "must be two components" in page.board.words["basins"]
+
+
+def test_a_run_that_ends_has_no_orbit(opened):
+    page = opened(lambda: FALL, x0=(1.0, 0.0))
+    page.widgets.switches["orbit"].value = True
+    assert page.worker.wait(60)
+    assert "the arc ends before it can come back" in page.board.words["orbit"]
+    with pytest.raises(ArgumentError, match="there is no exponents yet"):
+        page.saved("exponents", "png")
+
+
+def test_the_page_has_the_limits_of_an_address(opened):
+    page = opened(models.impact_oscillator)
+    before = page.scene
+    for field, value in (("points", 10**9), ("window", -1.0), ("level", float("nan")), ("columns", 10**9)):
+        page.change(**{field: value})
+        assert page.scene is before
+        assert f"{field} must be" in page.widgets.words.object
+    page.change(points=100)
+    assert page.scene.points == 100
+    assert "must be" not in page.widgets.words.object
+
+
+def test_the_ends_of_the_diagram_are_typed_one_after_the_other(opened):
+    page = opened(models.impact_oscillator)
+    page.change(low=5.0)
+    assert "The diagram needs from" in page.widgets.words.object
+    page.change(high=6.0)
+    assert page.worker.wait(60)
+    assert (page.scene.low, page.scene.high) == (5.0, 6.0)
+    assert min(page.board.figures.diagram.largest.data["parameter"]) == 5.0
+
+
+def test_a_click_beyond_a_slider_moves_its_end(opened):
+    page = opened(models.impact_oscillator)
+    page.move("w", 9.0)
+    assert page.worker.wait(60)
+    slider = page.widgets.sliders["w"]
+    assert (slider.value, slider.end) == (9.0, 9.0)
+
+
+def test_words_about_columns_are_those_of_a_column_that_ended(opened):
+    """A column that reached its end may carry a remark; it is not why another one ended early."""
+    page = opened(models.impact_oscillator)
+    chart = diagram_call(page.subject, page.scene).result(progress=False)
+    chart["message"] = chart.message.astype(object)
+    chart.message[:2] = ["a remark", "the cause"]
+    chart.status[1] = StatusCode.NON_FINITE
+    job = Job("diagram", "another", (lambda: None,))
+    page.show(Outcome(job, 0, (page.scene, chart), "", 0.0))
+    assert page.board.words["diagram"] == "Diagram: 1 column ended early. the cause"
+
+
+def test_a_picture_that_is_not_there_can_be_held(opened):
+    page = opened(models.vibroimpact, query={"p.omega": "0", "columns": "2"})
+    assert page.board.live is None
+    page.hold(True)
+    page.hold(False)
 
 
 def test_a_system_without_parameters_or_jumps(opened):

@@ -41,6 +41,21 @@ def test_an_address_leads_back_to_its_scene(omega, v1, window, points):
         assert getattr(found, field) == getattr(scene, field)
 
 
+def test_another_parameter_of_the_diagram_brings_its_ends():
+    """In an address as on the page, unless the ends are told; the order does not matter."""
+    low, high = FOUNDING.ranges["P"]
+    found, refused = from_query(FOUNDING, {"low": "300.0", "over": "P"})
+    assert refused == []
+    assert (found.over, found.low, found.high) == ("P", 300.0, high)
+    assert to_query(FOUNDING, found) == {"over": "P", "low": "300.0"}
+    found, _ = from_query(FOUNDING, {"over": "P"})
+    assert (found.low, found.high) == (low, high)
+    # The ends of the first parameter are told where they are those of another one.
+    odd = found.with_(low=7.3, high=8.0)
+    again, _ = from_query(FOUNDING, to_query(FOUNDING, odd))
+    assert (again.over, again.low, again.high) == ("P", 7.3, 8.0)
+
+
 @pytest.mark.parametrize(
     ("name", "text", "said"),
     [

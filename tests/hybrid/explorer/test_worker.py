@@ -102,3 +102,16 @@ def test_a_closed_worker_ends():
     made.want([Job("first", 1, (lambda: time.sleep(0.05),))])
     made.close()
     assert not made.thread.is_alive()
+
+
+def test_who_closes_a_worker_need_not_wait():
+    """A part may take long, and the thread that shows results must go on."""
+    begun, end = threading.Event(), threading.Event()
+    made = Worker(lambda outcome: None)
+    made.want([Job("first", 1, (lambda: (begun.set(), end.wait(10)),))])
+    assert begun.wait(10)
+    made.close(wait=False)
+    assert made.thread.is_alive()
+    end.set()
+    made.thread.join(10)
+    assert not made.thread.is_alive()

@@ -63,13 +63,16 @@ def test_a_branch_of_such_orbits_says_that_nothing_is_held():
     assert "held" not in alone.status.message
 
 
-def test_a_particle_between_two_disks_keeps_the_speed_of_the_guess():
-    disks, speed = models.three_disk_billiard(), 1.25
-    orbit = periodic_orbit(disks, (0.1, -np.sqrt(3) + 1e-5, speed, 1e-5), period=8 / speed * 1.02)
+@pytest.mark.parametrize("aside", [1e-6, 1e-5, 2e-5, 3e-5])
+@pytest.mark.parametrize("speed", [0.7, 1.25, 2.0])
+def test_a_particle_between_two_disks_keeps_the_speed_of_the_guess(speed, aside):
+    """The speed across is nothing but rounding, which each period multiplies by 98."""
+    disks = models.three_disk_billiard()
+    orbit = periodic_orbit(disks, (0.1, -np.sqrt(3) + aside, speed, 1e-5), period=8 / speed * 1.02)
     assert orbit.status.ok
     assert np.hypot(*orbit.x0[2:]) == pytest.approx(speed, rel=1e-9)
     assert orbit.period == pytest.approx(8 / np.hypot(*orbit.x0[2:]), rel=1e-11)
-    assert "speed = 1.25" in orbit.status.message
+    assert f"speed = {speed:.9g}" in orbit.status.message
     # Two reflections, each stretching by sigma - 1 + sqrt(sigma (sigma - 2)) with sigma = 6.
     assert orbit.multipliers[0] == pytest.approx((5 + np.sqrt(24)) ** 2, rel=1e-9)
 
