@@ -29,7 +29,7 @@ from hybrid.compiler.opaque import SLOPES, OpaqueFunction, check_plain
 from hybrid.compiler.parts import PARTS
 from hybrid.compiler.propagators.choice import propagator
 from hybrid.compiler.propagators.equations import Boundary, known_positive
-from hybrid.compiler.readers import readers
+from hybrid.compiler.readers import is_free, readers
 from hybrid.compiler.steep import fields_at_crossings, steep_at_guards, steep_inside
 from hybrid.compiler.surfaces import surfaces
 from hybrid.compiler.taylor.loops import padded
@@ -39,7 +39,7 @@ from hybrid.kernels.types.codes import WIDE
 from hybrid.symbolic.continuity import jumps_of, may_be_abrupt, may_jump
 from hybrid.symbolic.derivatives import jacobian_of
 from hybrid.symbolic.expressions import JUMPING, ONE, ZERO
-from hybrid.symbolic.nodes import forget, mentions, nodes_of
+from hybrid.symbolic.nodes import forget, nodes_of
 from hybrid.symbolic.periodicity import is_periodic
 from hybrid.symbolic.printer import IMPORTS, assignments, unprintable
 from hybrid.symbolic.signs import simplified
@@ -182,7 +182,7 @@ def _emitted(system: HybridSystem) -> Emitted:
             )
             for field, around in zip(fields, boundaries, strict=True)
         ),
-        autonomous=tuple(_is_free(field.expressions, (symbols.t,)) for field in fields),
+        autonomous=tuple(is_free(field.expressions, (symbols.t,)) for field in fields),
         discontinuities=tuple(
             _where_it_jumps(system, i, fields[i], boundaries[i], symbols) for i in range(len(fields))
         ),
@@ -193,8 +193,8 @@ def _emitted(system: HybridSystem) -> Emitted:
             for field, around in zip(fields, boundaries, strict=True)
         ),
         crossing=crossing,
-        timed_guard=tuple(not _is_free(guard.expressions, (symbols.t,)) for guard in guards),
-        timed_reset=tuple(not _is_free(reset.expressions, (symbols.t,)) for reset in resets),
+        timed_guard=tuple(not is_free(guard.expressions, (symbols.t,)) for guard in guards),
+        timed_reset=tuple(not is_free(reset.expressions, (symbols.t,)) for reset in resets),
         read_by=readers(system, fields, guards, conditions, resets, symbols),
         jumping_reset=tuple(
             reset.expressions is None or bool(jumps_of(reset.expressions, (symbols.t, *symbols.x)))
@@ -495,8 +495,4 @@ def _is_affine(written: Written, variables: Sequence[sympy.Symbol]) -> bool:
     # A floor or a sign has slope zero on both sides of its jumps.
     jumps = nodes_of(JUMPING, *written.expressions)
     entries = [entry for row in written.jacobian for entry in row[: len(variables)]]
-    return _is_free(jumps, variables) and _is_free(entries, variables)
-
-
-def _is_free(expressions: Iterable[sympy.Expr] | None, variables: Sequence[sympy.Symbol]) -> bool:
-    return expressions is not None and not any(mentions(expression, variables) for expression in expressions)
+    return is_free(jumps, variables) and is_free(entries, variables)

@@ -8,6 +8,7 @@ import sympy
 
 from hybrid.compiler.written import Written
 from hybrid.kernels.types.codes import BY_FLOW, BY_GUARD, BY_NOTHING
+from hybrid.symbolic.nodes import mentions
 from hybrid.symbolic.tracing import Symbols
 from hybrid.system.graph import HybridSystem
 
@@ -61,3 +62,8 @@ def _symbols_in(functions: Iterable[Written], row: int | None = None) -> set[sym
         for expression in each.expressions if row is None else each.expressions[row : row + 1]:
             found |= expression.free_symbols
     return found
+
+
+def is_free(expressions: Iterable[sympy.Expr] | None, variables: Sequence[sympy.Symbol]) -> bool:
+    """Whether expressions are known, and depend on none of the variables."""
+    return expressions is not None and not any(mentions(expression, variables) for expression in expressions)
