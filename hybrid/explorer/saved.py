@@ -35,7 +35,7 @@ def saved_figure(
         # A run that ended before its first interval has no history to draw.
         found = None
     if live is None or (picture in ("exponents", "orbit", "branch", "basins") and found is None):
-        raise ArgumentError(f"Save: there is no {picture} yet. Switch it on, or wait until it is drawn.")
+        raise ArgumentError(f"Save: nothing has been drawn of {picture!r} yet. Switch it on, or wait.")
     match picture:
         case "portrait":
             plot.plot_phase(live.arc, across, up, ax=ax)

@@ -111,17 +111,19 @@ def _found_start(
     """A start from which the most happens: jumps, else motion, else anything that runs."""
     rng = np.random.default_rng(20240507)
     n, last = system.dimension, LONG * default_duration(system, values)
-    modes = [each.name for each in system.modes if mode in (None, each.name, each.part_of)]
+    modes = [each for each in system.modes if mode in (None, each.name, each.part_of)]
     # A drive brings a small start to its own size; without a drive, the size stays.
     ends = (0.02, 2.0) if system.forcing_period(values) is not None else (2.0, 0.02)
     random = rng.uniform(-1.0, 1.0, (STARTS_TRIED, n)).round(3)
     tries = [np.zeros(n), *(np.geomspace(*ends, STARTS_TRIED)[:, None] * random)]
     best: tuple[float, tuple[float, ...], str | None] | None = None
     for x in tries:
-        for name in modes:
-            start = start_in(Case(system, dict(values), name, tuple(x.tolist()), 0.0, last), name)
+        for part in modes:
+            start = start_in(Case(system, dict(values), part.name, tuple(x.tolist()), 0.0, last), part.name)
             if start is None:
                 continue
+            # A mode that has been split is named as its author named it: the start tells the part.
+            name = part.part_of or part.name
             try:
                 arc = simulate(system, start, (0.0, last), mode=name, parameters=values, max_jumps=1000)
             except HybridError:

@@ -9,7 +9,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 import models
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition, from_equations
 from hybrid.errors import ArgumentError
 from hybrid.explorer.page import Page
 from hybrid.explorer.pictures import diagram_call
@@ -213,9 +213,9 @@ def test_pictures_are_saved(opened, suffix):
     for picture in ("portrait", "section", "time series", "exponents"):
         file = page.saved(picture, suffix).read()
         assert file[:4] == b"\x89PNG" if suffix == "png" else b"<svg" in file
-    with pytest.raises(ArgumentError, match="there is no orbit yet"):
+    with pytest.raises(ArgumentError, match="nothing has been drawn of 'orbit' yet"):
         page.saved("orbit", suffix)
-    assert "there is no orbit yet" in page.widgets.words.object
+    assert "nothing has been drawn" in page.widgets.words.object
 
 
 def test_the_diagram_keeps_while_its_parameter_moves(opened):
@@ -266,7 +266,7 @@ def test_a_run_that_ends_has_no_orbit(opened):
     page.widgets.switches["orbit"].value = True
     assert page.worker.wait(60)
     assert "the arc ends before it can come back" in page.board.words["orbit"]
-    with pytest.raises(ArgumentError, match="there is no exponents yet"):
+    with pytest.raises(ArgumentError, match="nothing has been drawn of 'exponents' yet"):
         page.saved("exponents", "png")
 
 
@@ -359,3 +359,16 @@ def test_ranges_are_checked(ranges, said):
     with pytest.raises(ArgumentError) as raised:
         subject(models.impact_oscillator(), "", ranges=ranges)
     assert said in str(raised.value)
+
+
+def test_a_split_system_starts_in_a_mode_that_its_author_named():
+    equations = from_equations(
+        lambda t, x, p: (x.v, -x.q - 0.3 * np.sign(x.v) + np.cos(t)), state=("q", "v"), period=2 * np.pi
+    )
+    found = subject(equations, "")
+    assert found.mode in {each.part_of for each in equations.modes}
+    page = Page(found, {"mode": found.mode}, lambda act: act())
+    assert page.worker.wait(120)
+    assert page.board.words["address"] == ""
+    assert page.board.live.arc.status.ok
+    page.close()
