@@ -108,7 +108,7 @@ def inherit(model, left, transition, sides):
 
 
 @njit(**KERNEL)
-def side_of(model, run, mode, transition, t, x, before, was_on, work):
+def side_of(model, run, place, transition, before, was_on, work):
     """Side of a guard, 0 if the next step has to show it, and the order of the derivative that decides.
 
     The order is 0 off the guard, 1 if the guard's speed decides, and 2 if rounding may hide or reverse the
@@ -119,6 +119,7 @@ def side_of(model, run, mode, transition, t, x, before, was_on, work):
     may jump; an infinite one has the side of its sign.
     ``work.field`` is current.
     """
+    mode, t, x = place
     value = guard_value(model, transition, t, x, work.scalar)
     if math.isnan(value):
         return before, JUMPING if may_jump(model, run, transition, t, x, work) else 0
@@ -240,9 +241,9 @@ def is_held_beside(model, run, transition, mode, t, x, towards, work):
 @njit(**KERNEL)
 def side_here(model, run, place, transition, before, known, own, work):
     """``side_of`` a guard, where one that a coarser rounding let fire early is not taken for crossed."""
-    mode, t, x = place
+    _, t, x = place
     was_on = known and before.order > 0
-    now, order = side_of(model, run, mode, transition, t, x, before.side, was_on, work)
+    now, order = side_of(model, run, place, transition, before.side, was_on, work)
     if known and not own and order == 0 and before.side == -now:
         speed = guard_speed(model, transition, t, x, work.field, work.gradient)
         if was_left_behind(model, run, transition, t, x, speed, before.side, work):

@@ -71,9 +71,13 @@ def direction_on_path(model, transition, t, x, s, out, work):
 
 
 @njit(**KERNEL)
-def time_of_jump(model, transition, t, x, i, shift, shortest, longest, rises, work):
-    """When a guard changes its sign on a parallel to the path, from the crossing on; nan if it does not."""
-    reach = shortest
+def time_of_jump(model, transition, t, x, parallel, reach, rises, work):
+    """When a guard changes its sign on a parallel to the path, from the crossing on; nan if it does not.
+
+    The ``parallel`` is a component and its shift; ``reach`` the shortest and the longest time that is tried.
+    """
+    i, shift = parallel
+    reach, longest = reach
     while reach <= longest:
         low, high = -reach, reach
         if (
@@ -100,8 +104,8 @@ def plane_of_jump(model, transition, t, x, unit, shortest, rises, work):
         shift = APART * weight(x, unit, i, work)
         if shift == 0.0:
             shift = APART
-        before = time_of_jump(model, transition, t, x, i, -shift, shortest, longest, rises, work)
-        after = time_of_jump(model, transition, t, x, i, shift, shortest, longest, rises, work)
+        before = time_of_jump(model, transition, t, x, (i, -shift), (shortest, longest), rises, work)
+        after = time_of_jump(model, transition, t, x, (i, shift), (shortest, longest), rises, work)
         gradient[i] = 0.5 * (before - after) / shift
         total -= gradient[i] * work.field[i]
     if math.isnan(total):

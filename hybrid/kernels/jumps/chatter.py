@@ -148,6 +148,58 @@ def change_of_limit(model, method, run, gain, misfit, work):
     return misfit
 
 
+@njit(**INLINE)
+def gain_of_ratio(ratio):
+    """So many times the last change of a limit, which goes with the speed squared, do later jumps make."""
+    return ratio * ratio / (1.0 - ratio * ratio)
+
+
+@njit(**KERNEL)
+def misfit_of_limit(model, method, run, speed, span, shift, drowned, work):
+    """What later jumps may still change the limit by, in units of the tolerances; the limit is followed.
+
+    ``speed`` is the guard's after the last jump, with its sign; ``shift`` is how far the jump has moved the
+    time of the limit. Where jumps are driven and not ``drowned`` in rounding, there is no limit to compare
+    with yet.
+    """
+    gain = gain_of_ratio(run.restitution)
+    misfit = change_of_limit_time(model, method, run, gain, shift, span)
+    if misfit * method.rtol > FAR and not drowned:
+        run.trail[LIMIT, 0] = math.inf
+        return misfit
+    keep_endless(model, run, run.last_fired, speed, work)
+    follow_mean(model, run, run.last_fired, speed, span, work)
+    return change_of_limit(model, method, run, gain, misfit, work)
+
+
+@njit(**KERNEL)
+def limit_is_known(model, method, run, speed, span, since_last, band, work):
+    """Whether the limit of the jumps is known after this one; the limit state goes to ``work.settled``.
+
+    ``speed`` is the guard's, away from zero, ``span`` the time to the limit, and ``band`` the rounding of the
+    guard.
+    """
+    n, ratio = model.dimension, run.restitution
+    # The flight that has ended, and the speed after it, in the series with the ratio of this impact.
+    flight, slower = run.trail[LIMIT, n] * (1.0 - ratio), ratio * run.trail[BEFORE, n]
+    steady = abs(since_last - flight) <= STEADY * flight + 8.0 * EPSILON * abs(run.phase)
+    steady = steady and abs(speed - slower) <= STEADY * slower
+    # A flight whose height v^2 / 2 a is at the level of rounding cannot be followed.
+    height = 0.25 * speed * span * (1.0 - ratio)
+    drowned = steady and height <= band
+    seen = run.chattering >= FEWEST_JUMPS or speed <= INVISIBLE * run.trail[BEFORE, 0]
+    shallow = height <= SHALLOW * band or seen
+    shift = span - (run.trail[LIMIT, n] - since_last)
+    signed = -far_side(model, run, run.last_fired) * speed
+    misfit = misfit_of_limit(model, method, run, signed, span, shift, drowned, work)
+    # The misfit shrinks with the square of the speed until rounding, which grows as the speed falls, takes
+    # over. Where it is more than rounding, jumps are slightly driven, and more of them are needed.
+    noise = NOISE * gain_of_ratio(ratio) * band / height
+    floor = misfit > ratio * run.trail[IMPULSE, n] and misfit * method.rtol < min(ROUGH, noise)
+    run.trail[IMPULSE, n] = misfit
+    return drowned or (shallow and (misfit <= 1.0 or floor))
+
+
 @njit(**KERNEL)
 def accumulation(model, method, run, transition, since_last, work):
     """Follow the jumps of one transition; once their limit is known, return the time to it, else 0.
@@ -160,8 +212,7 @@ def accumulation(model, method, run, transition, since_last, work):
     n = model.dimension
     model.field(run.mode, run.phase, run.y, model.parameters, work.field)
     speed = guard_speed(model, transition, run.phase, run.y, work.field, work.gradient)
-    side = -far_side(model, run, transition)
-    speed *= side
+    speed *= -far_side(model, run, transition)
     value = guard_value(model, transition, run.phase, run.y, work.scalar)
     band = rounding_band(model, run, transition, run.phase, run.y, work)
     span, found = 0.0, False
@@ -173,33 +224,7 @@ def accumulation(model, method, run, transition, since_last, work):
         return 0.0
     consecutive = run.chatter_jumps + 1 == run.jumps and run.chattering > 0
     if consecutive and fired_before(run, 1) == transition:
-        ratio = run.restitution
-        # The flight that has ended, and the speed after it, in the series with the ratio of this impact.
-        flight, slower = run.trail[LIMIT, n] * (1.0 - ratio), ratio * run.trail[BEFORE, n]
-        steady = abs(since_last - flight) <= STEADY * flight + 8.0 * EPSILON * abs(run.phase)
-        steady = steady and abs(speed - slower) <= STEADY * slower
-        # A flight whose height v^2 / 2 a is at the level of rounding cannot be followed.
-        height = 0.25 * speed * span * (1.0 - ratio)
-        drowned = steady and height <= band
-        seen = run.chattering >= FEWEST_JUMPS or speed <= INVISIBLE * run.trail[BEFORE, 0]
-        shallow = height <= SHALLOW * band or seen
-        shift = span - (run.trail[LIMIT, n] - since_last)
-        # The change is of second order in the speed, which each jump multiplies by the ratio.
-        gain = ratio * ratio / (1.0 - ratio * ratio)
-        misfit = change_of_limit_time(model, method, run, gain, shift, span)
-        if drowned or not misfit * method.rtol > FAR:
-            keep_endless(model, run, transition, side * speed, work)
-            follow_mean(model, run, transition, side * speed, span, work)
-            misfit = change_of_limit(model, method, run, gain, misfit, work)
-        else:
-            # The jumps are driven; there is no chatter yet, and no limit to compare with the next one.
-            run.trail[LIMIT, 0] = math.inf
-        # The misfit shrinks with the square of the speed until rounding, which grows as the speed falls,
-        # takes over. Where it is more than rounding, jumps are slightly driven, and more of them are needed.
-        noise = NOISE * gain * band / height
-        floor = misfit > ratio * run.trail[IMPULSE, n] and misfit * method.rtol < min(ROUGH, noise)
-        found = drowned or (shallow and (misfit <= 1.0 or floor))
-        run.trail[IMPULSE, n] = misfit
+        found = limit_is_known(model, method, run, speed, span, since_last, band, work)
         run.chattering += 1
     else:
         run.chattering = 1
@@ -295,14 +320,15 @@ def chatter_matrix(model, run, transition, work):
 
 
 @njit(**KERNEL)
-def along_mean(model, run, transition, t, x, direction, span, mean, jacobian, out, work):
-    """Derivative of the mean field at ``x (n,)`` in a direction, into ``out (n,)``.
+def along_mean(model, run, transition, t, direction, span, out, work):
+    """Derivative of the mean field at ``work.trial (n,)`` in a direction, into ``out (n,)``.
 
-    ``mean (n,)`` and ``jacobian`` are the mean field and the Jacobian of the field there. The derivative of
-    the guard's acceleration is a central difference. It moves no component by more than a share of the
-    component's size, or of the way that the component goes in the time ``span``.
+    ``work.new (n,)`` and ``work.reset_jacobian`` are the mean field and the Jacobian of the field there. The
+    derivative of the guard's acceleration is a central difference. It moves no component by more than a share
+    of the component's size, or of the way that the component goes in the time ``span``.
     """
     n, place, beside = model.dimension, work.rounding[0], work.rounding[1]
+    x, mean, jacobian = work.trial, work.new, work.reset_jacobian
     step = math.inf
     for i in range(n):
         size = max(abs(x[i]), run.scale[i], span * abs(mean[i]))
@@ -334,7 +360,7 @@ def drift_with_mean(model, run, transition, span, work):
         for i in range(n):
             column[i] = work.saltation[i, j]
         for order in range(1, 3):
-            along_mean(model, run, transition, t, middle, column, span, mean, jacobian, image, work)
+            along_mean(model, run, transition, t, column, span, image, work)
             for i in range(n):
                 column[i] = image[i] * span / order
                 work.saltation[i, j] += column[i]

@@ -23,6 +23,7 @@ from hybrid.kernels.events.sides import (
     LANDED,
     STARTED,
     Arrival,
+    Place,
     Sides,
     beyond_at_start,
     end_instant,
@@ -100,7 +101,7 @@ def arrived(task):
             continue
         if underflows(model, transition, t, run.y, t, run.y, work.scalar):
             continue
-        now, order = side_of(model, run, mode, transition, t, run.y, before, False, work)
+        now, order = side_of(model, run, Place(mode, t, run.y), transition, before, False, work)
         if order == BY_STEP and may_jump(model, run, transition, t, run.y, work):
             # An event at a jump of the guard lies beyond the near side.
             now = -before

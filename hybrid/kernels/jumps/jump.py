@@ -298,7 +298,7 @@ def jump(task, transition):
         run.ill_conditioned += 1
     run.last_kind, run.last_transversality = kind, transversality
     run.due[transition] = 0
-    remember_jump(model, run, record, transition, transversality, kind, known, work.new, work)
+    remember_jump(run, record, transition, transversality, kind, known, work.new, work)
     if locked:
         map_of_instant(run, n, work.saltation)
         assume_sizes(n, work)

@@ -88,7 +88,7 @@ def follow_impacts(task, transition, remaining):
     remember_flight(run, record, model.dimension, span, x_limit)
     begin_instant(run, model.dimension, tangents, work)
     forward(run, model.period, span)
-    remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, True, x_limit, work)
+    remember_jump(run, record, transition, 0.0, LIMIT_OF_CHATTER, True, x_limit, work)
     if tangents > 0:
         n = model.dimension
         assume_sizes(n, work)
@@ -147,7 +147,7 @@ def go_to_limit(task, turn, left):
         for j in range(n):
             work.saltation[i, j] = math.nan
     forward(run, model.period, left)
-    remember_jump(model, run, record, transition, 0.0, LIMIT_OF_CHATTER, True, work.settled, work)
+    remember_jump(run, record, transition, 0.0, LIMIT_OF_CHATTER, True, work.settled, work)
     if tangents > 0:
         run.singular_jumps += 1
         run.log_determinant = math.nan

@@ -7,12 +7,12 @@ from hybrid.kernels.types.options import KERNEL
 
 
 @njit(**KERNEL)
-def remember_jump(model, run, record, transition, transversality, kind, known, x_plus, work):
-    """Write a jump from the run's state to ``x_plus (n,)`` into the record, if it keeps any.
+def remember_jump(run, record, transition, transversality, kind, known, x_plus, work):
+    """Write a jump from the run's state to ``x_plus`` into the record, if it keeps any.
 
     Its matrix is ``work.saltation`` if that is ``known``; else the matrix follows from the other entries.
     """
-    n, slot = model.dimension, record.jumps
+    n, slot = record.jump_states.shape[2], record.jumps
     if slot == record.jump_phase.shape[0]:
         return
     record.jump_phase[slot] = run.phase

@@ -45,7 +45,7 @@ def ramp(shape):
 @njit
 def side(model, run, t, x, work):
     model.field(0, t, x, model.parameters, work.field)
-    return _side_of(model, run, 0, 0, t, x, 0, True, work)
+    return _side_of(model, run, (0, t, x), 0, 0, True, work)
 
 
 @pytest.mark.parametrize("rate", [1.0, -1.0, 1e-6, -3e5])

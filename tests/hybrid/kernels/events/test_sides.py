@@ -141,7 +141,7 @@ def side_of(
     )
     model = SimpleNamespace(direction=integers(direction))
     work = SimpleNamespace(scalar=None, field=None, gradient=None)
-    return stubbed.side_of(model, None, 0, 0, 0.0, None, before, was_on, work)
+    return stubbed.side_of(model, None, (0, 0.0, None), 0, before, was_on, work)
 
 
 @pytest.mark.parametrize("sign", [-1, 1])

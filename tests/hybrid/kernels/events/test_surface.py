@@ -198,10 +198,10 @@ class TestKernels:
         model, work = self.setup_of(lambda t, x: rises * np.sign(x[0] - 1.5 * x[1] + 3.5))
         tested = plain(surface)
         for i, shift, wanted in ((0, 0.01, -0.01 / 3.5), (0, -0.01, 0.01 / 3.5), (1, 0.02, 0.03 / 3.5)):
-            found = tested.time_of_jump(model, 1, 0.0, self.X, i, shift, 1e-7, 0.1, rises, work)
+            found = tested.time_of_jump(model, 1, 0.0, self.X, (i, shift), (1e-7, 0.1), rises, work)
             assert found == pytest.approx(wanted, rel=1e-9)
-        assert np.isnan(tested.time_of_jump(model, 1, 0.0, self.X, 0, 1.0, 1e-7, 0.1, rises, work))
-        assert np.isnan(tested.time_of_jump(model, 1, 0.0, self.X, 0, 0.01, 1e-7, 0.1, -rises, work))
+        assert np.isnan(tested.time_of_jump(model, 1, 0.0, self.X, (0, 1.0), (1e-7, 0.1), rises, work))
+        assert np.isnan(tested.time_of_jump(model, 1, 0.0, self.X, (0, 0.01), (1e-7, 0.1), -rises, work))
 
     @pytest.mark.parametrize("rises", [1.0, -1.0])
     def test_the_plane_of_a_jump(self, rises):

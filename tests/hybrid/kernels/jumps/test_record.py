@@ -33,15 +33,14 @@ def record():
     )
 
 
-MODEL = SimpleNamespace(dimension=2)
 WORK = SimpleNamespace(saltation=np.array([[1.0, 2.0], [3.0, 4.0]]))
 
 
 def test_jumps(run, record):
     kernels = plain(module)
-    kernels.remember_jump(MODEL, run, record, 3, -0.5, 1, False, np.array([6.0, 7.0]), WORK)
+    kernels.remember_jump(run, record, 3, -0.5, 1, False, np.array([6.0, 7.0]), WORK)
     assert (record.jumps, record.matrices) == (1, 0)
-    kernels.remember_jump(MODEL, run, record, 4, 0.5, 2, True, np.array([8.0, 9.0]), WORK)
+    kernels.remember_jump(run, record, 4, 0.5, 2, True, np.array([8.0, 9.0]), WORK)
     assert (record.jumps, record.matrices) == (2, 1)
     assert record.jump_phase.tolist() == [0.25, 0.25]
     assert record.jump_cycle.tolist() == [7, 7]
@@ -53,7 +52,7 @@ def test_jumps(run, record):
     # Matrices lie side by side, without gaps for jumps that have none.
     assert record.jump_saltation.tolist() == [[[1.0, 2.0], [3.0, 4.0]], [[0.0, 0.0], [0.0, 0.0]]]
     # A full record keeps no more.
-    kernels.remember_jump(MODEL, run, record, 5, 0.5, 2, True, np.array([8.0, 9.0]), WORK)
+    kernels.remember_jump(run, record, 5, 0.5, 2, True, np.array([8.0, 9.0]), WORK)
     assert (record.jumps, record.matrices) == (2, 1)
     assert record.jump_transition.tolist() == [3, 4]
 
