@@ -14,7 +14,7 @@ from hybrid.kernels.events.guards import (
     rounding_band,
     sides_at,
 )
-from hybrid.kernels.events.path import state_at
+from hybrid.kernels.events.path import state_at, time_at
 from hybrid.kernels.events.record import start_record
 from hybrid.kernels.events.resolution import restore_sides
 from hybrid.kernels.events.touches import note_touch, remember_touch, share_with_one_touch
@@ -32,6 +32,7 @@ from hybrid.kernels.steps.step import (
     interpolant_path,
     interpolation_stages,
     moves_nothing,
+    path_of_step,
     rates,
     starting_step,
 )
@@ -99,7 +100,7 @@ def remember_touch_on_step(model, method, run, record, t, h, whole, work):
     place = run.grazing_place * whole
     interpolation_stages(model, method, run.mode, t, h, run.y, work)
     interpolant_path(method, h, run.y, model.dimension, work)
-    state_at(work.path, method.powers.shape[0] - 1, model.dimension, place / h, work.state)
+    state_at(path_of_step(method, t, h, work), model.dimension, place / h, work.state)
     remember_touch(model, run, record, place / h, t + place, work)
 
 
@@ -140,13 +141,13 @@ def find_event(task, h, interpolated):
     attempts, model, method, run, _, work = task_of(task)
     tangents = task.tangents
     mode, t = run.mode, run.phase
-    ignored, touched = NO_TRANSITION, 0.0
+    ignored, touched, path = NO_TRANSITION, 0.0, path_of_step(method, t, h, work)
     for trial in range(2):
         if not (interpolated and trial == 0):
             interpolation_stages(model, method, mode, t, h, run.y, work)
         if not all_affine(model, mode):
             interpolant_path(method, h, run.y, model.dimension, work)
-        theta, fired, proved, blurred = earliest_crossing(model, method, run, t, h, ignored, touched, work)
+        theta, fired, proved, blurred = earliest_crossing(model, method, run, path, ignored, touched, work)
         if blurred != NO_TRANSITION:
             side = run.rehearsal[0, blurred]
             if SHORTER * h > FINEST * measured_time(model, run, mode):
@@ -174,7 +175,7 @@ def find_event(task, h, interpolated):
         )
         if shortened != NOT_THERE:
             return shortened, correction, first
-        if drowns(model, method, run, fired, t, theta, h, work):
+        if drowns(model, run, fired, path, theta, work):
             attempt_again(attempts, model, method, mode, t, theta * h, run.y, tangents, work)
             return theta * h, 0.0, fired
         attempt_again(attempts, model, method, mode, t, h, run.y, tangents, work)
@@ -192,7 +193,7 @@ def find_event(task, h, interpolated):
 
 
 @njit(**KERNEL)
-def drowns(model, method, run, transition, t, theta, h, work):
+def drowns(model, run, transition, path, theta, work):
     """Whether a flight from a bent guard back to it, to the share ``theta`` of the step, is all rounding.
 
     The slope of the guard has told where such a flight ends; the values of the guard on the way do not.
@@ -201,10 +202,11 @@ def drowns(model, method, run, transition, t, theta, h, work):
         return False
     for part in range(3):
         place = 0.5 * part * theta
-        state_at(work.path, method.powers.shape[0] - 1, model.dimension, place, work.state)
-        value = guard_value(model, transition, t + place * h, work.state, work.scalar)
-        model.guard_gradient(transition, t + place * h, work.state, model.parameters, work.gradient)
-        if abs(value) > rounding_band(model, run, transition, t + place * h, work.state, work):
+        state_at(path, model.dimension, place, work.state)
+        t = time_at(path, place)
+        value = guard_value(model, transition, t, work.state, work.scalar)
+        model.guard_gradient(transition, t, work.state, model.parameters, work.gradient)
+        if abs(value) > rounding_band(model, run, transition, t, work.state, work):
             return False
     return True
 

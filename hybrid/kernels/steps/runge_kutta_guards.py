@@ -170,7 +170,7 @@ def is_resolved(model, method, run, transition, t, h, work):
 
 
 @njit(**INLINE)
-def earliest_crossing(model, method, run, t, h, ignored, touched, work):
+def earliest_crossing(model, method, run, path, ignored, touched, work):
     """Earliest crossing on the attempted step over the mode's guards but ``ignored``, and its transition.
 
     The guard of ``ignored`` touches zero at the share ``touched`` of the step. Returns
@@ -180,9 +180,9 @@ def earliest_crossing(model, method, run, t, h, ignored, touched, work):
     guards without a crossing are brought up to date, to the end of the step, and guards that were left are no
     longer held to be zero at its start; ``resolution.restore_sides`` takes that back. For a guard with a
     crossing, ``run.rehearsal[3]`` holds its side before that.
-    ``work.path`` must hold the interpolant if any guard of the mode is not affine.
+    The ``path`` must be the interpolant if any guard of the mode is not affine.
     """
-    mode, degree_of_path = run.mode, method.powers.shape[0] - 1
+    mode, t, h = run.mode, path.start, path.pace
     earliest, fired, proved, blurred = NO_ROOT, NO_TRANSITION, 1.0, NO_TRANSITION
     forget_touches(run)
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
@@ -230,21 +230,7 @@ def earliest_crossing(model, method, run, t, h, ignored, touched, work):
             unsure = asks_error(run, on_guard) and not leaves_as_known(
                 model, run, transition, on_guard, t, h, work
             )
-            theta, side, share = crossing_on_path(
-                model,
-                method,
-                run,
-                transition,
-                work.path,
-                degree_of_path,
-                -1,
-                t,
-                h,
-                1.0,
-                end,
-                False,
-                work,
-            )
+            theta, side, share = crossing_on_path(model, method, run, transition, path, end, work)
             proved = min(proved, share)
         if underflows(model, transition, t, run.y, t + h, work.new, work.scalar):
             continue

@@ -17,7 +17,7 @@ from hybrid.kernels.arithmetic.powers import power_of_two
 from hybrid.kernels.events.derivatives import speed_rounding
 from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced, sides_at
 from hybrid.kernels.events.onset import BY_SPEED
-from hybrid.kernels.events.path import state_at, time_at, value_at
+from hybrid.kernels.events.path import state_at, time_at, up_to, value_at
 from hybrid.kernels.events.record import start_record
 from hybrid.kernels.events.resolution import restore_sides
 from hybrid.kernels.events.touches import remember_touch
@@ -48,7 +48,7 @@ from hybrid.kernels.types.codes import (
     STEP_TOO_SMALL,
     WIDE,
 )
-from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.layout import EPSILON, Path
 from hybrid.kernels.types.options import INLINE, KERNEL
 from hybrid.kernels.types.task import task_of
 
@@ -140,10 +140,16 @@ def accept_series(model, run, tangents, order, h, work):
 
 
 @njit(**KERNEL)
-def remember_series(model, run, record, order, t, h, span, clock, work):
+def remember_series(model, run, record, path, span):
     """Write a step along the series into the record: the state and time as polynomials in a share of it."""
-    slot, n = start_record(run, record, t, span), model.dimension
-    rows, series = record.step_coefficients[slot], work.series
+    slot, n = start_record(run, record, path.start, span), model.dimension
+    rows, series, order, h, clock = (
+        record.step_coefficients[slot],
+        path.powers,
+        path.degree,
+        path.length,
+        path.clock,
+    )
     power = 1.0
     for o in range(order + 1):
         for i in range(n):
@@ -259,7 +265,8 @@ def series_step(task, remaining):
     else:
         h = min(h, 1e100)
     if is_forced(model, mode):
-        h = attempts.explained_series(model, method, run, tangents, order, clock, h, work)
+        path = Path(series, order, clock, t, 1.0, h, exact)
+        h = attempts.explained_series(model, method, run, tangents, path, work)
         if not h > 0.0:
             return NON_FINITE, 0.0
     elif (
@@ -279,24 +286,22 @@ def series_step(task, remaining):
         evaluate_with_sizes(series, order, h, 0, front)
     fired, cut = NO_TRANSITION, False
     if guards > 0:
-        theta, fired, proved, blurred = earliest_on_series(
-            attempts, model, method, run, order, t, h, clock, work
-        )
+        path = Path(series, order, clock, t, 1.0, h, exact)
+        theta, fired, proved, blurred = earliest_on_series(attempts, model, method, run, path, work)
         for _ in range(MOST_SHORTER):
             if blurred == NO_TRANSITION or SHORTER * h <= 4.0 * EPSILON * measured_time(model, run, mode):
                 break
             h *= SHORTER
             evaluate_with_sizes(series, order, h, 0, front)
             restore_sides(model, run)
-            theta, fired, proved, blurred = earliest_on_series(
-                attempts, model, method, run, order, t, h, clock, work
-            )
+            path = up_to(path, h)
+            theta, fired, proved, blurred = earliest_on_series(attempts, model, method, run, path, work)
         end = min(theta, proved, 1.0)
         if run.grazing_place <= end:
             s = run.grazing_place * h
-            state_at(series, order, n, s, work.state)
+            state_at(path, n, s, work.state)
             place = run.grazing_place / end
-            remember_touch(model, run, record, place, time_at(series, order, clock, t, 1.0, s), work)
+            remember_touch(model, run, record, place, time_at(path, s), work)
         cut = proved < min(theta, 1.0)
         if cut:
             theta, fired = proved, NO_TRANSITION
@@ -315,7 +320,7 @@ def series_step(task, remaining):
     if stays and (model.timed[mode] == 1 or moves_nothing(model, run, series[1], h)):
         return STEP_TOO_SMALL, 0.0
     if record.step_phase.shape[0] > 0 and span > 0.0:
-        remember_series(model, run, record, order, t, h, span, clock, work)
+        remember_series(model, run, record, Path(series, order, clock, t, 1.0, h, exact), span)
     accept_series(model, run, tangents, order, h, work)
     if order < method.order:
         # The next series looks for its root behind a series of the full order.

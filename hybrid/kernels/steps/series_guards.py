@@ -254,12 +254,12 @@ def underflows_on_series(series, column, order):
 
 
 @njit(**KERNEL)
-def is_resolved_by_series(model, run, transition, column, order, t, h, clock, on_guard, work):
+def is_resolved_by_series(model, run, transition, column, path, on_guard, work):
     """Whether the end of the series leaves the sign of a guard at both ends of the step alone.
 
     As ``runge_kutta_guards.is_resolved``. ``column`` is that of the guard, or -1 if the guard is no series.
     """
-    n, series = model.dimension, work.series
+    n, series, order, t, h = model.dimension, path.powers, path.degree, path.start, path.length
     if model.degree[run.mode] > 0 or on_guard > 0:
         # A polynomial has no other terms; the derivatives of a guard that is zero tell its side.
         return True
@@ -282,14 +282,14 @@ def is_resolved_by_series(model, run, transition, column, order, t, h, clock, on
         size = max(abs(series[0, i]), abs(series[1, i] * h), abs(work.trial[i]))
         error = last_terms(series, i, order, h)
         work.field_after[i] = error if error > ROUNDING_OF_STATE * EPSILON * size else 0.0
-    later = time_at(series, order, clock, t, 1.0, h)
+    later = time_at(path, h)
     return keeps_sign(model, transition, t, run.y, work) and keeps_sign(
         model, transition, later, work.trial, work
     )
 
 
 @njit(**KERNEL)
-def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
+def earliest_on_series(attempts, model, method, run, path, work):
     """Earliest crossing on a step over the guards of the mode, and its transition.
 
     Returns ``(theta, transition, proved, blurred)``, and brings sides up to date, as
@@ -297,7 +297,7 @@ def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
     series itself is a polynomial, up to the remainder of the series; what it is a sum of stands behind the
     series. For any other guard its own expression is bounded on the series of the state.
     """
-    mode, series = run.mode, work.series
+    mode, series, order, t, h = run.mode, path.powers, path.degree, path.start, path.length
     kind = model.propagator[mode]
     earliest, fired, proved, blurred = NO_ROOT, NO_TRANSITION, 1.0, NO_TRANSITION
     forget_touches(run)
@@ -307,18 +307,16 @@ def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
         keep_side(run, transition)
         on_guard, side = run.on_guard[transition], run.side[transition]
         if model.guard_in_series[transition] == 0:
-            later = time_at(series, order, clock, t, 1.0, h)
+            later = time_at(path, h)
             for i in range(model.dimension):
                 work.trial[i] = series[order + 1, i]
-            theta, share = attempts.crossing_beside_series(
-                model, method, run, transition, order, t, h, clock, work
-            )
+            theta, share = attempts.crossing_beside_series(model, method, run, transition, path, work)
             side = run.rehearsal[3, transition]
             run.rehearsal[3, transition] = 0
             proved = min(proved, share)
             if underflows(model, transition, t, run.y, later, work.trial, work.scalar):
                 continue
-            if not is_resolved_by_series(model, run, transition, -1, order, t, h, clock, on_guard, work):
+            if not is_resolved_by_series(model, run, transition, -1, path, on_guard, work):
                 blurred = transition
             if theta == NO_ROOT:
                 keep_change(run, transition, side)
@@ -370,9 +368,7 @@ def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
             seen = degree <= order - TAIL_OF_GUARD and not is_close(
                 series, column, order, MARGIN * rest + UNDERFLOW
             )
-            if not seen and not is_resolved_by_series(
-                model, run, transition, column, order, t, h, clock, on_guard, work
-            ):
+            if not seen and not is_resolved_by_series(model, run, transition, column, path, on_guard, work):
                 blurred = transition
             ends = work.stack[row, 2], work.stack[row, 2 + degree]
             theta = root_between(series, column, order, known, h, start * h, end * h, *ends, side) / h
@@ -401,7 +397,7 @@ def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
         note_touches(run, transition, degree, known, hidden, theta, band, work)
         if underflows_on_series(series, column, order):
             continue
-        if not is_resolved_by_series(model, run, transition, column, order, t, h, clock, on_guard, work):
+        if not is_resolved_by_series(model, run, transition, column, path, on_guard, work):
             blurred = transition
         if theta == NO_ROOT:
             keep_change(run, transition, side)

@@ -7,7 +7,7 @@ from numba import njit
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.slopes import change_of_rate, whole_jacobian
 from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL, VECTOR, Pair
-from hybrid.kernels.types.layout import EPSILON, Method, Model, Task, Work
+from hybrid.kernels.types.layout import EPSILON, Method, Model, Path, Task, Work
 from hybrid.kernels.types.options import INLINE, KERNEL, exported
 
 # At the start of a run, a state below this many tolerances counts as this large.
@@ -151,6 +151,12 @@ def interpolant_path(method, h, y, dimension, work):
             for j in range(count):
                 total += method.powers[k, j] * work.stages[j, i]
             work.path[k, i] = h * total
+
+
+@njit(**INLINE)
+def path_of_step(method, t, h, work):
+    """The path that ``interpolant_path`` writes, for a step from ``t``."""
+    return Path(work.path, method.powers.shape[0] - 1, -1, t, h, 1.0, False)
 
 
 @njit(**KERNEL)
