@@ -16,9 +16,9 @@ from numba import njit
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.events.guards import has_program, has_terms_in_state
 from hybrid.kernels.events.path import up_to
-from hybrid.kernels.steps.pulses import SHARE, demand_on, first_hidden, is_steady
+from hybrid.kernels.steps.pulses import SHARE, Samples, demand_on, first_hidden, is_steady
 from hybrid.kernels.steps.step import combine, interpolant_path, rates_by_jacobian
-from hybrid.kernels.types.codes import ARGUMENTS, HIGH, IN_TIME, LOW, NARROW, RUNGE_KUTTA, TERMS
+from hybrid.kernels.types.codes import ARGUMENTS, HIGH, IN_TIME, LOW, NARROW, TERMS
 from hybrid.kernels.types.kinds import INTEGER, REAL
 from hybrid.kernels.types.layout import EPSILON, Method, Model, Path, Run, Work
 from hybrid.kernels.types.options import INLINE, KERNEL, exported
@@ -98,18 +98,11 @@ def _arguments_change(model, mode, path, work):
     return False
 
 
-@njit(**INLINE)
-def _nodes(model, method, mode):
-    """The places of a step at which a mode's method looks at a function of time."""
-    return method.nodes if model.propagator[mode] == RUNGE_KUTTA else method.series_nodes
-
-
 @njit(**KERNEL)
-def _longest_explained(model, method, run, path, timed, swings, seen, work):
+def _longest_explained(model, method, run, path, at, timed, swings, work):
     """The longest part of a path that is explained; one as short as rounding allows is taken as it is.
 
-    Asked of the parts of the field in time if ``timed``, and of those in the state if it ``swings``. If
-    ``seen``, ``work.places`` holds the states at which the method knows the field on the whole step.
+    Asked of the parts of the field in time if ``timed``, and of those in the state if it ``swings``.
 
     A step is cut to where it is explained. If that is hardly anything, the pulse has begun, and a step as far
     as its first place that is not explained has the length of the pulse.
@@ -131,10 +124,8 @@ def _longest_explained(model, method, run, path, timed, swings, seen, work):
                 continue
             tolerance = _tolerance(model, method, run, forcing)
             demand = demand_on(explained, tolerance, finest, kind == TERMS)
-            whole = seen and explained == longest
-            place, other, rest = first_hidden(
-                model, program, up_to(path, explained), _nodes(model, method, mode), demand, whole, work
-            )
+            part = Samples(at.nodes, at.seen and explained == longest)
+            place, other, rest = first_hidden(model, program, up_to(path, explained), part, demand, work)
             coarse = coarse or (rest > COARSE_PIECE * tolerance and kind == IN_TIME)
             if place < explained:
                 explained, beyond = place, other
@@ -163,7 +154,7 @@ def explained_step(model, method, run, h, work):
     for i in range(model.dimension):
         work.path[0, i], work.path[1, i] = run.y[i], work.stages[0, i]
     path = Path(work.path, 1, -1, run.phase, 1.0, h, False)
-    return _longest_explained(model, method, run, path, True, False, False, work)
+    return _longest_explained(model, method, run, path, Samples(method.nodes, False), True, False, work)
 
 
 @njit(**KERNEL)
@@ -206,7 +197,8 @@ def explained_attempt(model, method, run, h, work):
     explicit = method.implicit == 0
     if explicit:
         _keep_places(model, method, run, h, work)
-    explained = _longest_explained(model, method, run, path, False, True, explicit, work)
+    at = Samples(method.nodes, explicit)
+    explained = _longest_explained(model, method, run, path, at, False, True, work)
     return h if explained == h else SAFELY * explained
 
 
@@ -316,7 +308,8 @@ def explained_series(model, method, run, tangents, path, work):
     for _ in range(MOST_CUTS):
         part = up_to(path, h)
         swings = _arguments_change(model, run.mode, part, work)
-        h = _longest_explained(model, method, run, part, True, swings, False, work)
+        at = Samples(method.series_nodes, False)
+        h = _longest_explained(model, method, run, part, at, True, swings, work)
         for noisy in (False, True):
             if _follows_field(model, method, run, tangents, up_to(path, h), noisy, work):
                 return h

@@ -21,7 +21,7 @@ from hybrid.kernels.types.codes import (
     LOW_MIDDLE,
     MOST_SLOPE,
 )
-from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH
+from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH, VECTOR
 from hybrid.kernels.types.layout import Path
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -42,6 +42,16 @@ SHARE_OF_PIECE = 0.01
 # Largest number of pieces of a step, and of the part between two samples for an expression in the state.
 MOST_PIECES = 400
 MOST_PIECES_IN_STATE = 64
+
+
+class Samples(NamedTuple):
+    """The places of a step, as shares of it, at which a method looks at a function.
+
+    The method may have ``seen`` other states there than those of the path: these are ``work.places``.
+    """
+
+    nodes: VECTOR
+    seen: TRUTH
 
 
 class Demand(NamedTuple):
@@ -121,17 +131,16 @@ def _bound_at_stage(model, program, t, row, work):
 
 
 @njit(**KERNEL)
-def _take_samples(model, program, path, nodes, seen, work):
+def _take_samples(model, program, path, at, work):
     """Ranges of all rows at the nodes into ``work.samples``, low and high in turn.
 
-    The last row takes the largest low end and the smallest high end of each. The states at the nodes are
-    those of ``work.places`` if these are what the method has ``seen``, otherwise those of the path.
+    The last row takes the largest low end and the smallest high end of each.
     """
-    samples = work.samples
+    samples, nodes = work.samples, at.nodes
     common = samples[samples.shape[0] - 1]
     for j in range(len(nodes)):
         place = nodes[j] * path.length
-        if seen:
+        if at.seen:
             last = _bound_at_stage(model, program, path.start + place, j, work)
         else:
             last = model.bound(model.programs, program, path, place, 0.0, work.registers)
@@ -257,23 +266,22 @@ def _hidden_between(model, program, path, j, pieces, demand, work):
 
 
 @njit(**KERNEL)
-def first_hidden(model, program, path, nodes, demand, seen, work):
+def first_hidden(model, program, path, at, demand, work):
     """The length on which a forcing is explained, of a path, and the first unexplained place after it.
 
     Both are the path's length if all of it is explained. Returned third is the most that a piece adds to the
     forcing's integral, as far as bounds can tell, which rounding explains or which is as short as the
     rounding of time.
 
-    An expression of the state is unexplained only where the middle of a piece is certain to be. The method
-    may have ``seen`` other states at the nodes than those of the path: these are ``work.places``.
+    An expression of the state is unexplained only where the middle of a piece is certain to be.
     """
-    h, pieces, coarse = path.length, 0, 0.0
+    h, nodes, pieces, coarse = path.length, at.nodes, 0, 0.0
     steady, noise = is_steady(model, program, path, demand.negligible, work)
     if steady:
         row = work.registers[_last_row(model.programs, program)]
         return h, h, _unseen(row, noise, h, demand.tolerance)
-    _take_samples(model, program, path, nodes, seen, work)
-    if seen:
+    _take_samples(model, program, path, at, work)
+    if at.seen:
         before, place = _hidden_from_stages(model, program, path, nodes, demand, work)
         if place < h:
             return before, place, 0.0
