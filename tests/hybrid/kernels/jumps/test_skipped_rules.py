@@ -106,11 +106,6 @@ class TestWayIsFree:
         assert not self.free(1.01e-3 * way, ends=[-way])
 
     @BOTH
-    def test_guards_with_a_program_are_searched(self, way):
-        assert not self.free(way, programs=(2,), changes=True)
-        assert self.free(way, ends=[-way], programs=(2,))
-
-    @BOTH
     def test_not_if_the_last_reset_has_crossed_another_guard(self, way):
         assert not self.free(way, due=[1])
         assert not self.free(way, sides=[-way])
