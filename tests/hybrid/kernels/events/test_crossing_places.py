@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hybrid.kernels.events import crossings
+from hybrid.kernels.events import crossings, pieces
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP
 from hybrid.kernels.events.sampled import NOWHERE
 from hybrid.kernels.types.codes import HIGH, HIGH_MIDDLE, LEAST_SLOPE, LOW, LOW_MIDDLE, MOST_SLOPE
@@ -21,18 +21,18 @@ from tests.hybrid.kernels.events.curves import (
 )
 from tests.hybrid.kernels.plain import plain
 
-kernels = plain(crossings)
+kernels = plain(pieces)
 
 
 def known(side=1, *, on_guard=0, sure=0.0, base=0.0, tilt=0.0):
-    return crossings.Known(side, on_guard, sure, base, tilt)
+    return pieces.Known(side, on_guard, sure, base, tilt)
 
 
 class TestRows:
     @pytest.mark.parametrize(("base", "tilt"), [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.25, -4.0)])
     def test_the_row_of_a_place(self, base, tilt):
         model, _, _, work = scene(polynomial(1.0, 3.0, noise=0.125))
-        assert kernels._row_at(model, TRANSITION, ALONG, 2.0, known(base=base, tilt=tilt), work) == 2
+        assert kernels.row_at(model, TRANSITION, ALONG, 2.0, known(base=base, tilt=tilt), work) == 2
         value = -1.0 - base - 2.0 * tilt
         row = work.registers[2]
         assert row[[LOW, HIGH]].tolist() == [value - 0.125, value + 0.125]
@@ -77,9 +77,9 @@ class TestRows:
         assert [sign(place) for place in (1.0, 1.5, 2.0, 2.5, 3.0)] == [-1, 0, 0, 0, 1]
         assert [sign(place, 1.0) for place in (2.0, 2.5, 3.0, 3.5, 4.0)] == [-1, 0, 0, 0, 1]
         assert [sign(place, -2.0, 2.0) for place in (-1.0, -0.5, 0.0, 0.5, 1.0)] == [1, 0, 0, 0, -1]
-        assert kernels._distance_at(model, TRANSITION, ALONG, 5.0, 1, work) == 2.5
-        assert kernels._distance_at(model, TRANSITION, ALONG, 5.0, -1, work) == -3.5
-        assert kernels._distance_at(model, TRANSITION, ALONG, -1.0, -1, work) == 2.5
+        assert kernels.distance_at(model, TRANSITION, ALONG, 5.0, 1, work) == 2.5
+        assert kernels.distance_at(model, TRANSITION, ALONG, 5.0, -1, work) == -3.5
+        assert kernels.distance_at(model, TRANSITION, ALONG, -1.0, -1, work) == 2.5
 
     def test_guards_without_a_value(self):
         ends = scene(Curve(lambda place: place, lambda place: 1.0, domain=(1.0, 2.0)))
@@ -111,7 +111,7 @@ class TestRows:
             (1.0, -1, False),
             (3.0, -1, True),
         ):
-            found = kernels._known_at(
+            found = kernels.known_at(
                 model, TRANSITION, ALONG, place, side, known(on_guard=BY_STEP, base=3.0, tilt=5.0), work
             )
             parts = (3.0, 5.0) if hides else (0.0, 0.0)
@@ -122,7 +122,7 @@ class TestRootInBracket:
     def root(self, curve, low, high, side, *, on_guard=0, base=0.0, tilt=0.0):
         model, _, _, work = scene(curve)
         before = known(side, on_guard=on_guard, sure=low, base=base, tilt=tilt)
-        place = kernels._place_of_change(model, TRANSITION, ALONG, low, high, before, work)
+        place = kernels.place_of_change(model, TRANSITION, ALONG, low, high, before, work)
         assert all(low <= asked <= high and radius == 0.0 for asked, radius in curve.asked)
         assert len(curve.asked) <= 110
         return place
@@ -260,9 +260,9 @@ def test_how_far_tolerances_move_a_guard_at_a_place():
     work.intervals[0] = 3.995, 4.005
     path = ALONG._replace(length=8.0, exact=False)
     for side, tolerated in ((1, 0.0), (-1, 4.0 * (0.5 + 0.25 * 8.0))):
-        piece = kernels._piece(model, TRANSITION, path, 0, known(side), work)._replace(turns=side < 0)
-        assert kernels._tolerated(model, method, run, TRANSITION, path, piece, work) == tolerated
-        assert kernels._tolerated(model, method, run, TRANSITION, ALONG, piece, work) == 0.0
+        piece = kernels.piece_of(model, TRANSITION, path, 0, known(side), work)._replace(turns=side < 0)
+        assert plain(crossings)._tolerated(model, method, run, TRANSITION, path, piece, work) == tolerated
+        assert plain(crossings)._tolerated(model, method, run, TRANSITION, ALONG, piece, work) == 0.0
 
 
 @pytest.mark.parametrize("way", [1, -1])
@@ -285,4 +285,7 @@ def test_a_guard_that_a_jump_has_left_beyond_zero(way, value, slope, on_guard, r
         tilts=0.1,
     )
     model, _, run, work = scene(curve)
-    assert kernels._returns(model, run, TRANSITION, ALONG, known(way, on_guard=on_guard), work) == returns
+    assert (
+        plain(crossings)._returns(model, run, TRANSITION, ALONG, known(way, on_guard=on_guard), work)
+        == returns
+    )
