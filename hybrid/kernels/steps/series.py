@@ -132,7 +132,7 @@ def accept_series(model, run, tangents, path, work):
 
     The values of the state there, and what they are sums of, have been left behind the series.
     """
-    n, series, order = model.dimension, path.powers, path.degree
+    n, series, order = model.dimension, work.series, path.degree
     mode = run.mode
     first, last = model.first_outgoing[mode], model.first_outgoing[mode + 1]
     on_guard = 0
@@ -339,7 +339,7 @@ def time_taken(path, remaining, finest, ends):
     return remaining if not ends and remaining - span <= rounding else span
 
 
-@njit(**INLINE)
+@njit(**KERNEL)
 def land(model, run, tangents, fired, path, span, work):
     """Bring the state at the end of a path onto the guard that ends it; returns the time that this takes."""
     t, on_clock = path.start + span, path.clock >= 0

@@ -149,7 +149,7 @@ class TestAccept:
             y=np.full(2 * (1 + max(tangents, 5)), -1.0),
             divergence=1.0,
         )
-        kernels.accept_series(model, run, tangents, path_of(series, 0.5), None)
+        kernels.accept_series(model, run, tangents, path_of(series, 0.5), SimpleNamespace(series=series))
         return run, series
 
     def test_sizes(self):
