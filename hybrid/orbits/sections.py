@@ -15,11 +15,12 @@ from hybrid.display.progress import progress_bar
 from hybrid.display.tables import counted
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
+from hybrid.kernels.types.codes import UNLIMITED
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.memory import empty_record
-from hybrid.simulation.trajectory import UNLIMITED, Trajectory, start
+from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
 from hybrid.system.elements import Guard
@@ -190,9 +191,7 @@ def strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, 
         reached[0] = 0
 
         def more(parts: Any, most: int = most, total: int = total) -> int:
-            return kernel(
-                advance, parts, task, phase, most, UNLIMITED, states[total:], places[total:], reached
-            )
+            return kernel(advance, parts, task, phase, most, states[total:], places[total:], reached)
 
         code = trajectory.plan.called(more, trajectory.run, trajectory.work, reached)
         total += int(reached[0])

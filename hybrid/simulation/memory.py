@@ -14,6 +14,7 @@ import numpy as np
 from hybrid.kernels.instructions.registers import whole_registers
 from hybrid.kernels.types import codes
 from hybrid.kernels.types.layout import COUNTERS, NUMBERS, Record, Run, Work
+from hybrid.kernels.types.starts import Starts
 from hybrid.kernels.types.structure import Layout
 from hybrid.simulation.periods import split_time
 
@@ -51,6 +52,21 @@ def fresh_work(layout: Any, method: Any) -> Any:
         # There is no last step whose polynomial could be a guess.
         work.systems[-1] = -1.0
     return work
+
+
+def starts_of(plan: Any, run: Any, work: Any, origins: np.ndarray, **others: Any) -> Any:
+    """The ``Starts`` of runs in a memory that is fresh, with the other fields that they need."""
+    run_words, work_words = plan.run_layout.words(run), plan.work_layout.words(work)
+    return Starts(
+        counters=np.zeros(2, dtype=np.int64),
+        origins=origins,
+        verdicts=np.zeros(len(plan.model.target), dtype=np.int64),
+        run_words=run_words,
+        fresh_run=run_words.copy(),
+        work_words=work_words,
+        fresh_work=work_words.copy(),
+        **others,
+    )
 
 
 @lru_cache(MOST_LAYOUTS)

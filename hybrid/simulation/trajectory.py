@@ -12,6 +12,7 @@ from hybrid import arguments
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.kernels.types import codes
+from hybrid.kernels.types.codes import UNLIMITED
 from hybrid.simulation.initial_mode import choose_mode
 from hybrid.simulation.interrupt import CTRL_C, FIRST_BURST, Bursts, Stop
 from hybrid.simulation.memory import empty_record, fresh_run, fresh_work
@@ -20,8 +21,6 @@ from hybrid.simulation.plan import Plan, check_solver, plan_of
 from hybrid.solvers import Solver
 from hybrid.system.graph import HybridSystem, as_system, starting_mode
 from hybrid.system.growth import Unexplored
-
-UNLIMITED = np.iinfo(np.int64).max
 
 
 def start(

@@ -18,7 +18,7 @@ from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import CTRL_C, Bursts
 from hybrid.simulation.labelled import Names, attributes
-from hybrid.simulation.memory import fresh_run, fresh_work
+from hybrid.simulation.memory import fresh_run, fresh_work, starts_of
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import check_solver, plan_of
 from hybrid.simulation.simulate import simulate
@@ -255,42 +255,36 @@ class _Runs:
         trajectory = Trajectory(
             self.compiled, plan, self.model, run, work, 0, solver.max_steps, phase0, stop=CTRL_C
         )
-        memory = [plan.run_layout.words(run), plan.work_layout.words(work)]
-        words = [each for held in memory for each in (held, held.copy())]
         places = np.zeros((len(block), 3), dtype=np.int64)
-        verdicts = np.zeros(len(self.system.transitions), dtype=np.int64)
+        limits = {"max_steps": solver.max_steps, "max_jumps": self.max_jumps}
+        starts = starts_of(plan, run, work, origins, named=self.named, found=places, **limits)
+        memory = starts.run_words, starts.work_words, places, starts.verdicts, starts.counters
         kernel = load_kernels("hybrid.kernels.events.many").many_runs
         advance, task = load_kernels().advance, trajectory.task(trajectory.no_record())
-        reached = np.zeros(1, dtype=np.int64)
-        starts = origins, self.cycles, self.phases, self.named
-        results = states, places, verdicts, reached
-        begin, resumed, told = 0, 0, []
+        told: list[int] = []
         bursts = Bursts([trajectory])
-        while begin < len(block):
+        while starts.reached < len(block):
             bursts.most()
-            limits = solver.max_steps, bursts.steps, self.max_jumps
 
-            def more(parts: Any, progress: tuple[int, ...] = (begin, resumed, *limits)) -> int:
-                return kernel(advance, parts, task, *words, *starts, *progress, *results)
+            def more(parts: Any, budget: int = bursts.steps) -> int:
+                return kernel(advance, parts, task, starts, self.cycles, self.phases, budget, states)
 
-            reached[0] = begin
-            code = plan.called(more, *memory, places, verdicts, reached)
-            i = int(reached[0])
-            resumed = int(code == codes.GO_ON)
+            code = plan.called(more, *memory)
+            i, resumed = starts.reached, starts.resumed
             if code == codes.REFUSED:
                 # Python finds a mode where a guard of another one is not finite, takes steps in time where
                 # series hold the root of a guard that the start lies beyond, or says why no mode is allowed.
                 self.one_by_one.run(range(block.start + i, block.start + i + 1))
             elif not resumed and i < len(block):
-                self._tell(block.start + i, trajectory, code, verdicts)
+                self._tell(block.start + i, trajectory, code, starts.verdicts)
             if not resumed and i < len(block):
                 told.append(i)
-            begin = i if resumed else i + 1
+            starts.reached = i if resumed else i + 1
             # Only calls that used up their steps say how many steps fit into a burst.
             if bursts.judged(codes.MAX_STEPS) == StatusCode.INTERRUPTED if resumed else CTRL_C.is_set():
                 break
         done = np.zeros(len(block), dtype=bool)
-        done[:begin] = True
+        done[: starts.reached] = True
         done[told] = False
         rows = block.start + np.flatnonzero(done)
         if rows.size:

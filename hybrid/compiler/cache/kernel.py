@@ -15,6 +15,7 @@ from hybrid.kernels.types.kinds import (
     INTEGER,
     NOTHING,
     REAL,
+    SEVERAL,
     TRUTH,
     Array,
     Number,
@@ -105,6 +106,10 @@ def kernels_in(content: bytes) -> dict[str, Kernel]:
     """The kernels of a file, by name."""
     index, _, code = content.partition(b"\n")
     signatures = json.loads(index)
-    by_words = [name + BY_WORDS for name, (result, *_) in signatures.items() if result in RESULTS]
+    by_words = [
+        name + BY_WORDS
+        for name, (result, *kinds) in signatures.items()
+        if result in RESULTS and SEVERAL not in kinds
+    ]
     shared = Code(code, [*signatures, *by_words])
     return {name: Kernel(name, shared, result, kinds) for name, (result, *kinds) in signatures.items()}

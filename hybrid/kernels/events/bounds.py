@@ -28,7 +28,7 @@ from hybrid.kernels.arithmetic.intervals import (
 )
 from hybrid.kernels.types.codes import HIGH, HIGH_MIDDLE, LEAST_SLOPE, LOW, LOW_MIDDLE, MOST_SLOPE
 from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL, VECTOR
-from hybrid.kernels.types.layout import EPSILON, Programs
+from hybrid.kernels.types.layout import EPSILON, Path, Programs
 from hybrid.kernels.types.options import INLINE, KERNEL, exported
 
 # Over a radius this large the mean value theorem makes no range narrower.
@@ -60,7 +60,7 @@ def _whole_line(row):
 
 
 @njit(**KERNEL)
-def _bound_state(path, column, order, middle, radius, row):
+def _bound_state(path, column, middle, radius, row):
     """Bound a component of the path around ``middle`` by a parabola and its remainder.
 
     The remainder is at most ``radius**3`` times the sum of ``C(k, 3) |c_k| end**(k - 3)``.
@@ -68,8 +68,8 @@ def _bound_state(path, column, order, middle, radius, row):
     end = middle + radius
     value, slope, bend = 0.0, 0.0, 0.0
     size, third = 0.0, 0.0
-    for k in range(order, -1, -1):
-        coefficient = path[k, column]
+    for k in range(path.degree, -1, -1):
+        coefficient = path.powers[k, column]
         bend = bend * middle + slope
         slope = slope * middle + value
         value = value * middle + coefficient
@@ -92,10 +92,11 @@ def _bound_state(path, column, order, middle, radius, row):
 
 
 @njit(**KERNEL)
-def _bound_time(path, clock, order, start, pace, middle, radius, row):
-    """Bound the time along the step: ``start`` plus ``pace`` times the variable, or plus a clock's column."""
-    if clock >= 0:
-        _bound_state(path, clock, order, middle, radius, row)
+def _bound_time(path, middle, radius, row):
+    """Bound the time along the step."""
+    start, pace = path.start, path.pace
+    if path.clock >= 0:
+        _bound_state(path, path.clock, middle, radius, row)
     else:
         value = pace * middle
         row[LOW], row[HIGH] = value - pace * radius, value + pace * radius
@@ -299,22 +300,20 @@ def _constant_leaf(programs, place, row):
         _bound_constant(row, programs.parameters[a])
 
 
-@exported(INTEGER, Programs, INTEGER, MATRIX, INTEGER, INTEGER, REAL, REAL, REAL, REAL, MATRIX)
-def bound_guard(programs, transition, path, order, clock, start, pace, middle, radius, registers):
+@exported(INTEGER, Programs, INTEGER, Path, REAL, REAL, MATRIX)
+def bound_guard(programs, transition, path, middle, radius, registers):
     """Bounds of a guard over ``middle +- radius`` on a path; returns their row in ``registers``.
 
-    ``path (>= order + 1, columns)`` holds the coefficients of the state's components in powers of the step's
-    variable. Time is ``start`` plus ``pace`` times the variable if ``clock`` is negative; otherwise it is
-    ``start`` plus the column ``clock`` of the path. The slope is the derivative by the step's variable.
+    The slope is the derivative by the step's variable.
     """
     first = programs.first[transition]
     for place in range(first, programs.first[transition + 1]):
         row = registers[place - first]
         code = programs.rows[place, 0]
         if code == op.STATE:
-            _bound_state(path, programs.rows[place, 1], order, middle, radius, row)
+            _bound_state(path, programs.rows[place, 1], middle, radius, row)
         elif code == op.TIME:
-            _bound_time(path, clock, order, start, pace, middle, radius, row)
+            _bound_time(path, middle, radius, row)
         else:
             _constant_leaf(programs, place, row)
     return _run(programs, transition, registers, radius)

@@ -32,31 +32,27 @@ PLACES = 8
 
 
 @njit(**KERNEL)
-def sample(model, transition, path, order, clock, start, pace, place, work):
+def sample(model, transition, path, place, work):
     """Value of a guard at a place of the step, from the compiled function."""
-    state_at(path, order, model.dimension, place, work.state)
-    t = time_at(path, order, clock, start, pace, place)
-    return guard_value(model, transition, t, work.state, work.scalar)
+    state_at(path, model.dimension, place, work.state)
+    return guard_value(model, transition, time_at(path, place), work.state, work.scalar)
 
 
 @njit(**KERNEL)
-def farthest_from_zero(model, transition, path, order, clock, start, pace, place, work):
+def farthest_from_zero(model, transition, path, place, work):
     """How far a guard comes from zero up to a place of the step, at most; infinite if it has no bounds there.
 
     A guard that could not be traced is only sampled.
     """
     if has_program(model, transition):
         half = 0.5 * place
-        last = model.bound(
-            model.programs, transition, path, order, clock, start, pace, half, half, work.registers
-        )
-        row = work.registers[last]
+        row = work.registers[model.bound(model.programs, transition, path, half, half, work.registers)]
         distance = max(abs(row[LOW]), abs(row[HIGH]))
         return distance if distance >= 0.0 else math.inf
     distance = 0.0
     for i in range(1, PLACES + 1):
         there = place * i / PLACES
-        value = abs(sample(model, transition, path, order, clock, start, pace, there, work))
+        value = abs(sample(model, transition, path, there, work))
         distance = max(distance, value) if value >= 0.0 else math.inf
     return distance
 
@@ -72,20 +68,21 @@ def noise_of_signs(rounding, error, end):
 
 
 @njit(**KERNEL)
-def hidden_until(model, method, run, transition, path, order, clock, start, pace, length, end, exact, work):
+def hidden_until(model, method, run, transition, path, end, work):
     """The place of a step up to which the signs of a guard that is zero at its start are noise.
 
-    ``end`` is the value of the guard at the end of the step. With ``exact``, the path has no error of a
-    method. Returned second is whether the guard rests at zero.
+    ``end`` is the value of the guard at the end of the step. Returned second is whether the guard rests at
+    zero.
 
     A guard that jumps is never small, and its signs are no noise.
     """
+    start, length = path.start, path.length
     if may_jump(model, run, transition, start, run.y, work):
         return 0.0, False
     model.guard_gradient(transition, start, run.y, model.parameters, work.gradient)
-    error = 0.0 if exact else error_band(method, run, work.gradient, model.dimension)
+    error = 0.0 if path.exact else error_band(method, run, work.gradient, model.dimension)
     rounding = rounding_band(model, run, transition, start, run.y, work)
-    size = farthest_from_zero(model, transition, path, order, clock, start, pace, length, work)
+    size = farthest_from_zero(model, transition, path, length, work)
     if size < math.inf:
         # What is zero at the start has a size and rounding on the step.
         rounding += ROUNDING_OF_STATE * EPSILON * size
@@ -94,7 +91,7 @@ def hidden_until(model, method, run, transition, path, order, clock, start, pace
         if farthest <= noise:
             break
         place *= 0.5
-        farthest = farthest_from_zero(model, transition, path, order, clock, start, pace, place, work)
+        farthest = farthest_from_zero(model, transition, path, place, work)
     return place, size <= rounding
 
 

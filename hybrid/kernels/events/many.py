@@ -16,9 +16,10 @@ from hybrid.kernels.types.codes import (
     REFUSED,
     ROOTED,
 )
-from hybrid.kernels.types.kinds import CUBE, INDEX_MATRIX, INDICES, INTEGER, MATRIX, VECTOR
+from hybrid.kernels.types.kinds import CUBE, INDICES, INTEGER, VECTOR
 from hybrid.kernels.types.layout import ADVANCE, Parts, Task
 from hybrid.kernels.types.options import KERNEL, exported
+from hybrid.kernels.types.starts import Starts
 
 
 @njit(**KERNEL)
@@ -66,90 +67,55 @@ def mode_of_start(parts, task, named, verdicts):
     return chosen
 
 
+@njit(**KERNEL)
+def mode_of_fresh_run(parts, task, starts, i):
+    """``mode_of_start`` of the run from start ``i``, whose memory is made fresh."""
+    run = task.run
+    set_words(starts.run_words, starts.fresh_run)
+    set_words(starts.work_words, starts.fresh_work)
+    for c in range(task.model.dimension):
+        run.y[c] = starts.origins[i, c]
+        run.scale[c] = abs(starts.origins[i, c])
+    return mode_of_start(parts, task, starts.named, starts.verdicts)
+
+
 is_plain = njit(**KERNEL)(notes.is_plain)
 
 
-@exported(
-    INTEGER,
-    ADVANCE,
-    Parts,
-    Task,
-    INDICES,
-    INDICES,
-    INDICES,
-    INDICES,
-    MATRIX,
-    INDICES,
-    VECTOR,
-    INTEGER,
-    INTEGER,
-    INTEGER,
-    INTEGER,
-    INTEGER,
-    INTEGER,
-    CUBE,
-    INDEX_MATRIX,
-    INDICES,
-    INDICES,
-)
-def many_runs(
-    advance,
-    parts,
-    task,
-    run_words,
-    fresh_run,
-    work_words,
-    fresh_work,
-    origins,
-    cycles,
-    phases,
-    named,
-    begin,
-    resumed,
-    max_steps,
-    budget,
-    max_jumps,
-    states,
-    places,
-    verdicts,
-    reached,
-):
-    """The states ``(N, S, n)`` of runs from the ``origins (N, n)`` at ``S`` times, the last one their end.
+@exported(INTEGER, ADVANCE, Parts, Task, Starts, INDICES, VECTOR, INTEGER, CUBE)
+def many_runs(advance, parts, task, starts, cycles, phases, budget, states):
+    """The states ``(N, S, n)`` of runs from many starts at ``S`` times, the last one their end.
 
-    ``run_words`` and ``work_words`` are the memory of run and work, ``fresh_run`` and ``fresh_work`` what
-    that holds at the start. ``places (N, 3)`` gets the mode, the number of jumps and the number of states
-    reached. Stops at the first run that is not complete, or of which there is something to tell: its index
-    goes into ``reached (1,)``. Returns the code of that run; REFUSED if it cannot start here, GO_ON if the
-    ``budget`` of steps was used up, after which the next call resumes the run: ``resumed``.
+    ``starts.found (N, 3)`` gets the mode, the number of jumps and the number of states reached. Stops at the
+    first run that is not complete, or of which there is something to tell. Returns the code of that run;
+    REFUSED if it cannot start here, GO_ON if the ``budget`` of steps was used up, after which the next call
+    resumes the run.
     """
-    run, n = task.run, task.model.dimension
-    for i in range(begin, origins.shape[0]):
-        reached[0] = i
-        if i > begin or resumed == 0:
-            set_words(run_words, fresh_run)
-            set_words(work_words, fresh_work)
-            for c in range(n):
-                run.y[c] = origins[i, c]
-                run.scale[c] = abs(origins[i, c])
-            places[i, 2] = 0
-            mode = mode_of_start(parts, task, named, verdicts)
+    run, found = task.run, starts.found
+    for i in range(starts.reached, states.shape[0]):
+        starts.reached = i
+        if starts.resumed == 0:
+            found[i, 2] = 0
+            mode = mode_of_fresh_run(parts, task, starts, i)
             if mode == NO_MODE:
                 return REFUSED
             run.mode = mode
-        for s in range(places[i, 2], cycles.shape[0]):
+        starts.resumed = 0
+        for s in range(found[i, 2], cycles.shape[0]):
             before = run.steps
-            most = min(max_steps, before + budget)
-            code = advance(parts, task, cycles[s], phases[s], most, max_jumps)
+            most = min(starts.max_steps, before + budget)
+            code = advance(parts, task, cycles[s], phases[s], most, starts.max_jumps)
             budget -= run.steps - before
-            if code == MAX_STEPS and most < max_steps:
+            if code == MAX_STEPS and most < starts.max_steps:
+                starts.resumed = 1
                 return GO_ON
             if code != DONE:
                 return code
-            for c in range(n):
+            for c in range(task.model.dimension):
                 states[i, s, c] = run.y[c]
-            places[i, 2] = s + 1
-        places[i, 0], places[i, 1] = run.mode, run.jumps
-        if not is_plain(task.model, run, guards_beyond(named, verdicts)):
+            found[i, 2] = s + 1
+        found[i, 0], found[i, 1] = run.mode, run.jumps
+        if not is_plain(task.model, run, guards_beyond(starts.named, starts.verdicts)):
             return DONE
-    reached[0] = origins.shape[0]
+    starts.reached = states.shape[0]
     return DONE

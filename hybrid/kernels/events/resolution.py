@@ -79,6 +79,15 @@ def keep_crossing(run, transition, theta, side):
         run.passed[transition] = 0.5 * (run.passed[transition] + theta)
 
 
+@njit(**INLINE)
+def keep_outcome(run, transition, theta, side):
+    """Note a guard's crossing at the share ``theta`` of the step, or its ``side`` at the end without one."""
+    if theta == NO_ROOT:
+        keep_change(run, transition, side)
+    else:
+        keep_crossing(run, transition, theta, side)
+
+
 @njit(**KERNEL)
 def set_sides_before(model, run, earliest):
     """Make the kept sides before crossings those at the ``earliest`` crossing of all guards.

@@ -17,19 +17,18 @@ SAMPLES = 32
 
 
 @njit(**KERNEL)
-def sampled_change(
-    model, run, transition, path, order, clock, start, pace, length, side, on_guard, hidden, work
-):
+def sampled_change(model, run, transition, path, begin, work):
     """As ``first_change``, for a guard that could not be traced: it is evaluated at some places only."""
     run.unproved += 1
-    direction, low = model.direction[transition], hidden
+    side, on_guard, hidden = begin
+    direction, length, low = model.direction[transition], path.length, hidden
     for i in range(1, SAMPLES + 1):
         high = hidden + (length - hidden) * i / SAMPLES
-        value = sample(model, transition, path, order, clock, start, pace, high, work)
+        value = sample(model, transition, path, high, work)
         if value * side < 0.0:
             left, right = low, high
             if i == 1 and not is_zero(on_guard) and hidden == 0.0:
-                first = sample(model, transition, path, order, clock, start, pace, 0.0, work)
+                first = sample(model, transition, path, 0.0, work)
                 right = 0.0 if first * side <= 0.0 else high
             elif i == 1 and on_guard == BY_STEP:
                 right = 0.0
@@ -37,7 +36,7 @@ def sampled_change(
                 middle = 0.5 * (left + right)
                 if not left < middle < right:
                     break
-                if sample(model, transition, path, order, clock, start, pace, middle, work) * side > 0.0:
+                if sample(model, transition, path, middle, work) * side > 0.0:
                     left = middle
                 else:
                     right = middle

@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from hybrid.kernels.events.many import guards_beyond, mode_of_start, set_words
+from hybrid.kernels.events.many import guards_beyond, mode_of_fresh_run
 from hybrid.kernels.types.attractors import Known, Progress, Section
 from hybrid.kernels.types.codes import (
     DONE,
@@ -12,12 +12,13 @@ from hybrid.kernels.types.codes import (
     NO_MODE,
     NO_OBJECTION,
     REFUSED,
+    UNLIMITED,
 )
-from hybrid.kernels.types.kinds import INDEX_MATRIX, INDICES, INTEGER, MATRIX
+from hybrid.kernels.types.kinds import INDEX_MATRIX, INTEGER, MATRIX
 from hybrid.kernels.types.layout import ADVANCE, Parts, Task
 from hybrid.kernels.types.options import KERNEL, exported
+from hybrid.kernels.types.starts import Starts
 
-UNLIMITED = 9223372036854775807
 INFINITE = float("inf")
 # Columns of what is found: the attractor, the number of points, the code of the run, the mode at the start.
 OWNER, POINTS, CODE, MODE = range(4)
@@ -96,98 +97,75 @@ def violates_all(model, verdicts):
     return True
 
 
-@exported(
-    INTEGER,
-    ADVANCE,
-    Parts,
-    Task,
-    INDICES,
-    INDICES,
-    INDICES,
-    INDICES,
-    MATRIX,
-    INTEGER,
-    Known,
-    Section,
-    Progress,
-    INTEGER,
-    INTEGER,
-    INTEGER,
-    INTEGER,
-    INDEX_MATRIX,
-    INDICES,
-    INDICES,
-)
-def settle(
-    advance,
-    parts,
-    task,
-    run_words,
-    fresh_run,
-    work_words,
-    fresh_work,
-    origins,
-    named,
-    known,
-    section,
-    progress,
-    first,
-    resumed,
-    max_steps,
-    budget,
-    found,
-    verdicts,
-    reached,
-):
-    """Run from the ``origins (N, n)`` until each start is decided; rows of ``found (N, 4)``, see above.
+@njit(**KERNEL)
+def begin(parts, task, starts, section, progress, i):
+    """Begin the run from start ``i``; DONE, or REFUSED if it has no mode, or GO_ON if it has several."""
+    run, found, named = task.run, starts.found, starts.named
+    mode = mode_of_fresh_run(parts, task, starts, i)
+    progress.cycle, progress.phase = run.cycle, section.phase
+    progress.under_way, progress.points, progress.near, progress.streak = 0, 0, NONE, 0
+    if guards_beyond(named, starts.verdicts) > 0:
+        mode = NO_MODE
+    found[i, MODE] = mode
+    if mode != NO_MODE:
+        run.mode = mode
+        return DONE
+    found[i, OWNER], found[i, POINTS], found[i, CODE] = NONE, 0, REFUSED
+    return REFUSED if named != NO_MODE or violates_all(task.model, starts.verdicts) else GO_ON
+
+
+@njit(**KERNEL)
+def advance_until_decided(advance, parts, task, starts, known, section, progress, budget):
+    """Go on from point to point until the start of a run is decided; the code and the rest of the budget.
+
+    The code is GO_ON if the budget is used up.
+    """
+    run, code = task.run, DONE
+    while code == DONE and progress.streak < section.wanted and progress.points < section.most:
+        before = run.steps
+        most = min(starts.max_steps, before + budget)
+        code = next_point(advance, parts, task, section, progress, most)
+        budget -= run.steps - before
+        if code == MAX_STEPS and most < starts.max_steps:
+            return GO_ON, budget
+        if code == DONE:
+            progress.points += 1
+            owner = near(known, run.y, run.mode)
+            progress.streak = progress.streak + 1 if owner == progress.near and owner != NONE else 1
+            progress.near = owner
+            if owner == NONE:
+                progress.streak = 0
+    return code, budget
+
+
+@exported(INTEGER, ADVANCE, Parts, Task, Starts, Known, Section, Progress, INTEGER)
+def settle(advance, parts, task, starts, known, section, progress, budget):
+    """Run until each start is decided; the rows of ``starts.found (N, 4)`` are described above.
 
     A run stops at the point that decides its start. Its code is DONE then, and MAX_STEPS where ``most``
     points decide nothing; other codes are those of runs that end. REFUSED, with no mode at the start: it
-    violates the mode ``named``, or every mode if that is NO_MODE. Returns DONE after the last start, GO_ON if
-    the ``budget`` of steps was used up, after which the next call resumes the run ``reached (1,)``:
-    ``resumed``; REFUSED if more than one mode allows that start.
+    violates the mode that is named, or every mode if none is. Returns DONE after the last start, GO_ON if
+    the ``budget`` of steps was used up, after which the next call resumes the run; REFUSED if more than one
+    mode allows the start that was reached.
     """
-    run, n = task.run, task.model.dimension
-    for i in range(first, origins.shape[0]):
-        reached[0] = i
-        if i > first or resumed == 0:
-            set_words(run_words, fresh_run)
-            set_words(work_words, fresh_work)
-            for c in range(n):
-                run.y[c] = origins[i, c]
-                run.scale[c] = abs(origins[i, c])
-            progress.cycle, progress.phase = run.cycle, section.phase
-            progress.under_way, progress.points, progress.near, progress.streak = 0, 0, NONE, 0
-            mode = mode_of_start(parts, task, named, verdicts)
-            if guards_beyond(named, verdicts) > 0:
-                mode = NO_MODE
-            found[i, MODE] = mode
-            if mode == NO_MODE:
-                found[i, OWNER], found[i, POINTS], found[i, CODE] = NONE, 0, REFUSED
-                if named == NO_MODE and not violates_all(task.model, verdicts):
-                    return REFUSED
+    found = starts.found
+    for i in range(starts.reached, found.shape[0]):
+        starts.reached = i
+        if starts.resumed == 0:
+            code = begin(parts, task, starts, section, progress, i)
+            if code == GO_ON:
+                return REFUSED
+            if code == REFUSED:
                 continue
-            run.mode = mode
-        code = DONE
-        while code == DONE and progress.streak < section.wanted and progress.points < section.most:
-            before = run.steps
-            most = min(max_steps, before + budget)
-            code = next_point(advance, parts, task, section, progress, most)
-            budget -= run.steps - before
-            if code == MAX_STEPS and most < max_steps:
-                return GO_ON
-            if code == DONE:
-                progress.points += 1
-                owner = near(known, run.y, run.mode)
-                progress.streak = progress.streak + 1 if owner == progress.near and owner != NONE else 1
-                progress.near = owner
-                if owner == NONE:
-                    progress.streak = 0
+        code, budget = advance_until_decided(advance, parts, task, starts, known, section, progress, budget)
+        starts.resumed = 1 if code == GO_ON else 0
+        if code == GO_ON:
+            return GO_ON
         decided = code == DONE and progress.streak >= section.wanted
         found[i, OWNER] = progress.near if decided else NONE
         found[i, POINTS] = progress.points
         found[i, CODE] = MAX_STEPS if code == DONE and not decided else code
-    reached[0] = origins.shape[0]
+    starts.reached = found.shape[0]
     return DONE
 
 

@@ -4,7 +4,7 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.arithmetic.slopes import spread_of_rate
-from hybrid.kernels.events.crossings import first_change
+from hybrid.kernels.events.crossings import Begin, first_change
 from hybrid.kernels.events.derivatives import speed_rounding
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
@@ -17,7 +17,7 @@ from hybrid.kernels.events.guards import (
 from hybrid.kernels.events.sampled import NOWHERE
 from hybrid.kernels.jumps.rounds import fired_before, mark_endless
 from hybrid.kernels.types.codes import ENDLESS
-from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.layout import EPSILON, Path
 from hybrid.kernels.types.options import KERNEL
 
 # Jumps at one instant are not examined for a limit before there are this many.
@@ -59,9 +59,8 @@ def way_is_free(model, method, run, turn, span, work):
         if run.due[other] == 1 or (turned and crosses_towards(model.direction[other], side)):
             return False
         if has_program(model, other):
-            place, _, _ = first_change(
-                model, method, run, other, path, 1, -1, t, span, 1.0, side, 0, 0.0, True, work
-            )
+            way = Path(path, 1, -1, t, span, 1.0, True)
+            place, _, _ = first_change(model, method, run, other, way, Begin(side, 0, 0.0), work)
             crossed = place != NOWHERE
         else:
             end = guard_value(model, other, t + span, work.settled, work.scalar)

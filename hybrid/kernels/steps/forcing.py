@@ -15,11 +15,12 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.events.guards import has_program, has_terms_in_state
-from hybrid.kernels.steps.pulses import SHARE, first_hidden, is_steady
+from hybrid.kernels.events.path import up_to
+from hybrid.kernels.steps.pulses import SHARE, Samples, demand_on, first_hidden, is_steady
 from hybrid.kernels.steps.step import combine, interpolant_path, rates_by_jacobian
 from hybrid.kernels.types.codes import ARGUMENTS, HIGH, IN_TIME, LOW, NARROW, TERMS
 from hybrid.kernels.types.kinds import INTEGER, REAL
-from hybrid.kernels.types.layout import EPSILON, Method, Model, Run, Work
+from hybrid.kernels.types.layout import EPSILON, Method, Model, Path, Run, Work
 from hybrid.kernels.types.options import INLINE, KERNEL, exported
 
 # A piece that rounding explains, or that is as short as the rounding of time, is taken as it is: what it may
@@ -52,9 +53,9 @@ def _tolerance(model, method, run, forcing):
 
 
 @njit(**KERNEL)
-def _is_calm(model, method, run, mode, path, order, h, work):
+def _is_calm(model, method, run, path, work):
     """Whether all forcing is monotone on the step and known to be so for longer."""
-    start = run.phase
+    mode, start, h = run.mode, path.start, path.length
     known = run.calm_mode == mode + 1 and run.calm_cycle == run.cycle
     if known and start + h <= run.calm_until:
         return True
@@ -65,7 +66,7 @@ def _is_calm(model, method, run, mode, path, order, h, work):
         program = model.target.shape[0] + forcing
         if model.forcing_kind[forcing] != IN_TIME or not has_program(model, program):
             continue
-        steady, noise = is_steady(model, program, path, order, -1, start, AHEAD * h, 0.0, work)
+        steady, noise = is_steady(model, program, up_to(path, AHEAD * h), 0.0, work)
         if not steady or AHEAD * h * noise > SHARE * _tolerance(model, method, run, forcing):
             run.calm_wait = WAIT
             return False
@@ -75,7 +76,7 @@ def _is_calm(model, method, run, mode, path, order, h, work):
 
 
 @njit(**KERNEL)
-def _arguments_change(model, mode, path, order, clock, start, h, work):
+def _arguments_change(model, mode, path, work):
     """Whether an argument of the exponentials in the state changes so much that a step may hide a pulse.
 
     If not, the exponential is not so small anywhere on the step that its series does not show it.
@@ -88,10 +89,8 @@ def _arguments_change(model, mode, path, order, clock, start, h, work):
     program = model.target.shape[0] + forcing
     if not has_program(model, program):
         return True
-    last = model.bound(
-        model.programs, program, path, order, clock, start, 1.0, 0.5 * h, 0.5 * h, work.registers
-    )
-    first = model.programs.first[program]
+    first, half = model.programs.first[program], 0.5 * path.length
+    last = model.bound(model.programs, program, path, half, half, work.registers)
     for row in range(last + 1):
         change = work.registers[row, HIGH] - work.registers[row, LOW]
         if model.programs.checked[first + row] == 1 and not change <= MOST_CHANGE:
@@ -100,17 +99,16 @@ def _arguments_change(model, mode, path, order, clock, start, h, work):
 
 
 @njit(**KERNEL)
-def _longest_explained(model, method, run, path, order, clock, nodes, timed, swings, seen, h, work):
-    """The longest step up to ``h`` that is explained; one as short as rounding allows is taken as it is.
+def _longest_explained(model, method, run, path, at, timed, swings, work):
+    """The longest part of a path that is explained; one as short as rounding allows is taken as it is.
 
-    Asked of the parts of the field in time if ``timed``, and of those in the state if it ``swings``. If
-    ``seen``, ``work.places`` holds the states at which the method knows the field on the whole step.
+    Asked of the parts of the field in time if ``timed``, and of those in the state if it ``swings``.
 
     A step is cut to where it is explained. If that is hardly anything, the pulse has begun, and a step as far
     as its first place that is not explained has the length of the pulse.
     """
-    mode, start = run.mode, run.phase
-    if timed and clock < 0 and _is_calm(model, method, run, mode, path, order, h, work):
+    mode, h, clock = run.mode, path.length, path.clock
+    if timed and clock < 0 and _is_calm(model, method, run, path, work):
         timed = False
     if not (timed or swings):
         return h
@@ -125,21 +123,9 @@ def _longest_explained(model, method, run, path, order, clock, nodes, timed, swi
             if not asked or not has_program(model, program):
                 continue
             tolerance = _tolerance(model, method, run, forcing)
-            place, other, rest = first_hidden(
-                model,
-                program,
-                path,
-                order,
-                clock,
-                start,
-                nodes,
-                explained,
-                tolerance,
-                finest,
-                kind == TERMS,
-                seen and explained == longest,
-                work,
-            )
+            demand = demand_on(explained, tolerance, finest, kind == TERMS)
+            part = Samples(at.nodes, at.seen and explained == longest)
+            place, other, rest = first_hidden(model, program, up_to(path, explained), part, demand, work)
             coarse = coarse or (rest > COARSE_PIECE * tolerance and kind == IN_TIME)
             if place < explained:
                 explained, beyond = place, other
@@ -167,7 +153,8 @@ def explained_step(model, method, run, h, work):
     """
     for i in range(model.dimension):
         work.path[0, i], work.path[1, i] = run.y[i], work.stages[0, i]
-    return _longest_explained(model, method, run, work.path, 1, -1, method.nodes, True, False, False, h, work)
+    path = Path(work.path, 1, -1, run.phase, 1.0, h, False)
+    return _longest_explained(model, method, run, path, Samples(method.nodes, False), True, False, work)
 
 
 @njit(**KERNEL)
@@ -197,21 +184,21 @@ def explained_attempt(model, method, run, h, work):
     The interpolant of the attempted step, whose stages are those of ``work``, is the way between its ends.
     """
     interpolant_path(method, h, run.y, model.dimension, work)
-    degree, path, unit = method.powers.shape[0] - 1, work.path, 1.0
+    degree, powers, unit = method.powers.shape[0] - 1, work.path, 1.0
     for k in range(1, degree + 1):
         unit /= h
         for i in range(model.dimension):
-            path[k, i] *= unit
-            if not abs(path[k, i]) < math.inf:
+            powers[k, i] *= unit
+            if not abs(powers[k, i]) < math.inf:
                 return h
-    if not _arguments_change(model, run.mode, path, degree, -1, run.phase, h, work):
+    path = Path(powers, degree, -1, run.phase, 1.0, h, False)
+    if not _arguments_change(model, run.mode, path, work):
         return h
     explicit = method.implicit == 0
     if explicit:
         _keep_places(model, method, run, h, work)
-    explained = _longest_explained(
-        model, method, run, path, degree, -1, method.nodes, False, True, explicit, h, work
-    )
+    at = Samples(method.nodes, explicit)
+    explained = _longest_explained(model, method, run, path, at, False, True, work)
     return h if explained == h else SAFELY * explained
 
 
@@ -266,14 +253,14 @@ def _is_beyond_guard(model, run, order, s, work):
 
 
 @njit(**KERNEL)
-def _follows_field(model, method, run, tangents, order, clock, h, noisy, work):
+def _follows_field(model, method, run, tangents, path, noisy, work):
     """Whether the series has the field as its derivative at the nodes: its order may not know a pulse yet.
 
     Over the step both may differ by some tolerances, and with ``noisy`` by what rounding of the state makes
     of the field besides.
     """
-    n, mode, start = model.dimension, run.mode, run.phase
-    length, series = n * (1 + tangents), work.series
+    n, mode, start = model.dimension, run.mode, path.start
+    length, series, order, clock, h = n * (1 + tangents), path.powers, path.degree, path.clock, path.length
     field, other, missing = work.stages[0], work.stages[1], work.error
     for i in range(length):
         missing[i] = 0.0
@@ -311,22 +298,22 @@ def _follows_field(model, method, run, tangents, order, clock, h, noisy, work):
     return True
 
 
-@exported(REAL, Model, Method, Run, INTEGER, INTEGER, INTEGER, REAL, Work)
-def explained_series(model, method, run, tangents, order, clock, h, work):
-    """The length up to ``h`` of a step on which the series follows the forcing; nan if it is not finite."""
-    if not _is_finite(model, run.mode, tangents, order, work):
+@exported(REAL, Model, Method, Run, INTEGER, Path, Work)
+def explained_series(model, method, run, tangents, path, work):
+    """The length of the step on which a path of series follows the forcing; nan if it is not finite."""
+    if not _is_finite(model, run.mode, tangents, path.degree, work):
         return math.nan
-    nodes, longest = method.series_nodes, h
-    rounding = 0.0 if clock >= 0 else measured_time(model, run, run.mode)
+    h = path.length
+    rounding = 0.0 if path.clock >= 0 else measured_time(model, run, run.mode)
     for _ in range(MOST_CUTS):
-        swings = _arguments_change(model, run.mode, work.series, order, clock, run.phase, h, work)
-        h = _longest_explained(
-            model, method, run, work.series, order, clock, nodes, True, swings, False, h, work
-        )
+        part = up_to(path, h)
+        swings = _arguments_change(model, run.mode, part, work)
+        at = Samples(method.series_nodes, False)
+        h = _longest_explained(model, method, run, part, at, True, swings, work)
         for noisy in (False, True):
-            if _follows_field(model, method, run, tangents, order, clock, h, noisy, work):
+            if _follows_field(model, method, run, tangents, up_to(path, h), noisy, work):
                 return h
         h *= 0.5
-        if not h > FINEST * rounding + EPSILON * longest:
+        if not h > FINEST * rounding + EPSILON * path.length:
             break
-    return _unresolved(run, longest, h)
+    return _unresolved(run, path.length, h)

@@ -9,6 +9,7 @@ Where the expression is monotone, its ends explain it: one evaluation on interva
 """
 
 import math
+from typing import NamedTuple
 
 from numba import njit
 
@@ -20,6 +21,8 @@ from hybrid.kernels.types.codes import (
     LOW_MIDDLE,
     MOST_SLOPE,
 )
+from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH, VECTOR
+from hybrid.kernels.types.layout import Path
 from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Verdicts on a piece of a step.
@@ -41,20 +44,63 @@ MOST_PIECES = 400
 MOST_PIECES_IN_STATE = 64
 
 
+class Samples(NamedTuple):
+    """The places of a step, as shares of it, at which a method looks at a function.
+
+    The method may have ``seen`` other states there than those of the path: these are ``work.places``.
+    """
+
+    nodes: VECTOR
+    seen: TRUTH
+
+
+class Demand(NamedTuple):
+    """What may remain unseen of an expression on a step.
+
+    ``tolerance`` is that of its integral, values up to ``negligible`` do not matter. It may leave the range
+    of two samples by the share ``between``. Pieces are no shorter than ``finest``, and no more than ``most``.
+    An expression ``of_state`` has as many between any two samples.
+    """
+
+    tolerance: REAL
+    negligible: REAL
+    between: REAL
+    finest: REAL
+    most: INTEGER
+    of_state: TRUTH
+
+
+@njit(**INLINE)
+def demand_on(length, tolerance, finest, of_state):
+    """What is asked of an expression on a step.
+
+    An expression ``of_state`` varies with every step, and its bounds may be wide.
+    """
+    between = BETWEEN_IN_STATE if of_state else BETWEEN
+    most = MOST_PIECES_IN_STATE if of_state else MOST_PIECES
+    return Demand(tolerance, SHARE * tolerance / length, between, finest, most, of_state)
+
+
+@njit(**INLINE)
+def _last_row(programs, program):
+    """The row of the expression itself, behind those of its parts."""
+    return programs.first[program + 1] - 1 - programs.first[program]
+
+
 @njit(**INLINE)
 def _is_monotone(row):
     return row[LEAST_SLOPE] >= 0.0 or row[MOST_SLOPE] <= 0.0
 
 
 @njit(**KERNEL)
-def is_steady(model, program, path, order, clock, start, h, negligible, work):
-    """Whether no row that is checked turns round on a step of length ``h``, or the forcing is negligible.
+def is_steady(model, program, path, negligible, work):
+    """Whether no row that is checked turns round on a path, or the forcing is negligible.
 
     Rounding does not count as a turn. Returned second is the range of the forcing if it turns by rounding.
     """
     programs, registers = model.programs, work.registers
-    first = programs.first[program]
-    last = model.bound(programs, program, path, order, clock, start, 1.0, 0.5 * h, 0.5 * h, registers)
+    first, half = programs.first[program], 0.5 * path.length
+    last = model.bound(programs, program, path, half, half, registers)
     row = registers[last]
     if row[HIGH] - row[LOW] <= negligible:
         return True, 0.0
@@ -69,7 +115,7 @@ def is_steady(model, program, path, order, clock, start, h, negligible, work):
                 return False, 0.0
     if doubtful:
         # The middle may lie within rounding of a jump, another place will not.
-        model.bound(programs, program, path, order, clock, start, 1.0, ELSEWHERE * h, 0.0, registers)
+        model.bound(programs, program, path, ELSEWHERE * path.length, 0.0, registers)
         for place in range(last + 1):
             row = registers[place]
             if not widths[place] <= FLAT * (row[HIGH_MIDDLE] - row[LOW_MIDDLE]):
@@ -80,27 +126,24 @@ def is_steady(model, program, path, order, clock, start, h, negligible, work):
 @njit(**INLINE)
 def _bound_at_stage(model, program, t, row, work):
     """Bounds of all rows at the time and the state of one stage, a row of ``work.places``; the last row."""
-    place = work.places[row : row + 1]
-    return model.bound(model.programs, program, place, 0, -1, t, 1.0, 0.0, 0.0, work.registers)
+    place = Path(work.places[row : row + 1], 0, -1, t, 1.0, 0.0, False)
+    return model.bound(model.programs, program, place, 0.0, 0.0, work.registers)
 
 
 @njit(**KERNEL)
-def _take_samples(model, program, path, order, clock, start, nodes, h, seen, work):
+def _take_samples(model, program, path, at, work):
     """Ranges of all rows at the nodes into ``work.samples``, low and high in turn.
 
-    The last row takes the largest low end and the smallest high end of each. The states at the nodes are
-    those of ``work.places`` if these are what the method has ``seen``, otherwise those of the path.
+    The last row takes the largest low end and the smallest high end of each.
     """
-    samples = work.samples
+    samples, nodes = work.samples, at.nodes
     common = samples[samples.shape[0] - 1]
     for j in range(len(nodes)):
-        place = nodes[j] * h
-        if seen:
-            last = _bound_at_stage(model, program, start + place, j, work)
+        place = nodes[j] * path.length
+        if at.seen:
+            last = _bound_at_stage(model, program, path.start + place, j, work)
         else:
-            last = model.bound(
-                model.programs, program, path, order, clock, start, 1.0, place, 0.0, work.registers
-            )
+            last = model.bound(model.programs, program, path, place, 0.0, work.registers)
         for row in range(last + 1):
             low, high = work.registers[row, LOW_MIDDLE], work.registers[row, HIGH_MIDDLE]
             samples[j, 2 * row], samples[j, 2 * row + 1] = low, high
@@ -125,11 +168,12 @@ def _beyond(row, j, place, work):
 
 
 @njit(**KERNEL)
-def _judged(programs, first, last, j, whole, length, negligible, tolerance, between, work):
+def _judged(programs, program, j, whole, length, demand, work):
     """Whether a piece between the samples ``j`` and ``j + 1``, which has just been bounded, is explained.
 
     HIDDEN if its middle is certain to lie beyond what they explain, NOISY if rounding alone explains it.
     """
+    first, last = programs.first[program], _last_row(programs, program)
     samples, common = work.samples, work.samples[work.samples.shape[0] - 1]
     verdict = EXPLAINED
     # The last row is the forcing itself: if that is negligible, so are its parts.
@@ -141,14 +185,14 @@ def _judged(programs, first, last, j, whole, length, negligible, tolerance, betw
         low, high = _sampled_range(samples[j, i], samples[j, i + 1], samples[j + 1, i], samples[j + 1, i + 1])
         if place == last:
             beyond = _beyond(row, j, last, work)
-            if beyond <= negligible or beyond * length <= tolerance:
+            if beyond <= demand.negligible or beyond * length <= SHARE_OF_PIECE * demand.tolerance:
                 return EXPLAINED
         elif not row[HIGH] - row[LOW] < math.inf:
             # This part may be unused, such as the other branch of a choice.
             continue
         if whole and _is_monotone(row) and row[HIGH] - row[LOW] < math.inf:
             continue
-        slack = between * max(common[i] - common[i + 1], 0.0)
+        slack = demand.between * max(common[i] - common[i + 1], 0.0)
         one, other = samples[j, i + 1] - samples[j, i], samples[j + 1, i + 1] - samples[j + 1, i]
         rounding = min(row[HIGH_MIDDLE] - row[LOW_MIDDLE], max(one, other))
         noise = FLAT * rounding if rounding < math.inf else 0.0
@@ -174,93 +218,79 @@ def _unseen(row, noise, length, tolerance):
 
 
 @njit(**KERNEL)
-def _hidden_from_stages(model, program, start, nodes, h, negligible, tolerance, between, work):
+def _hidden_from_stages(model, program, path, nodes, demand, work):
     """A pulse at a stage that only the interpolant has: the node before it and its place, or the step twice.
 
     Such a pulse bends the interpolant, which then does not show it.
     """
+    h = path.length
     for k in range(len(nodes), work.places.shape[0]):
         place = work.places[k, model.dimension] * h
-        last = _bound_at_stage(model, program, start + place, k, work)
+        _bound_at_stage(model, program, path.start + place, k, work)
         j = 0
         while nodes[j + 1] * h < place:
             j += 1
-        first = model.programs.first[program]
-        share = SHARE_OF_PIECE * tolerance
-        verdict = _judged(model.programs, first, last, j, False, h, negligible, share, between, work)
-        if verdict == HIDDEN:
+        if _judged(model.programs, program, j, False, h, demand, work) == HIDDEN:
             return nodes[j] * h, place
     return h, h
 
 
 @njit(**KERNEL)
-def first_hidden(
-    model, program, path, order, clock, start, nodes, h, tolerance, finest, of_state, seen, work
-):
-    """The length on which a forcing is explained, of a step ``h``, and the first unexplained place after it.
+def _hidden_between(model, program, path, j, pieces, demand, work):
+    """``first_hidden`` between the samples ``j`` and ``j + 1``, the ends of the interval in ``work``.
 
-    Both are ``h`` if all of it is explained. ``tolerance`` is that of the forcing's integral. Returned third
-    is the most that a piece adds to that, as far as bounds can tell, which rounding explains or which is as
-    short as the rounding of time.
-
-    An expression ``of_state`` varies with every step, and its bounds may be wide: it is unexplained only
-    where the middle of a piece is certain to be. The method may have ``seen`` other states at the nodes than
-    those of the path: these are ``work.places``.
+    Returned last is the number of pieces so far, which was ``pieces`` before.
     """
-    programs = model.programs
-    between = BETWEEN_IN_STATE if of_state else BETWEEN
-    first, negligible = programs.first[program], SHARE * tolerance / h
-    steady, noise = is_steady(model, program, path, order, clock, start, h, negligible, work)
-    if steady:
-        return h, h, _unseen(work.registers[programs.first[program + 1] - 1 - first], noise, h, tolerance)
-    _take_samples(model, program, path, order, clock, start, nodes, h, seen, work)
-    if seen:
-        before, place = _hidden_from_stages(
-            model, program, start, nodes, h, negligible, tolerance, between, work
-        )
-        if place < h:
-            return before, place, 0.0
-    stack, pieces, limit, coarse = work.intervals, 0, MOST_PIECES, 0.0
-    for j in range(len(nodes) - 1):
-        top, whole = 0, True
-        if of_state:
-            pieces, limit = 0, MOST_PIECES_IN_STATE
-        stack[0, 0], stack[0, 1] = nodes[j] * h, nodes[j + 1] * h
-        while top >= 0:
-            low, high = stack[top, 0], stack[top, 1]
-            middle = 0.5 * (low + high)
-            radius = max(high - middle, middle - low)
-            last = model.bound(
-                programs, program, path, order, clock, start, 1.0, middle, radius, work.registers
-            )
-            pieces += 1
-            verdict = _judged(
-                programs,
-                first,
-                last,
-                j,
-                whole,
-                high - low,
-                negligible,
-                SHARE_OF_PIECE * tolerance,
-                between,
-                work,
-            )
-            whole = False
-            if verdict == UNKNOWN and pieces < limit:
-                if not (low < middle < high and high - low > finest and top < stack.shape[0] - 1):
-                    if tolerance > 0.0:
-                        beyond = _beyond(work.registers[last], j, last, work)
-                        coarse = max(coarse, beyond * (high - low))
-                    top -= 1
-                    continue
+    stack, top, whole, coarse = work.intervals, 0, True, 0.0
+    last, tolerance = _last_row(model.programs, program), demand.tolerance
+    while top >= 0:
+        low, high = stack[top, 0], stack[top, 1]
+        middle = 0.5 * (low + high)
+        model.bound(model.programs, program, path, middle, max(high - middle, middle - low), work.registers)
+        pieces += 1
+        verdict = _judged(model.programs, program, j, whole, high - low, demand, work)
+        row, whole = work.registers[last], False
+        if verdict == UNKNOWN and pieces < demand.most:
+            if low < middle < high and high - low > demand.finest and top < stack.shape[0] - 1:
                 stack[top, 0], stack[top + 1, 0], stack[top + 1, 1] = middle, low, middle
                 top += 1
-            elif verdict == HIDDEN or (verdict == UNKNOWN and not of_state):
-                return low, middle, coarse
-            else:
-                if verdict == NOISY:
-                    row = work.registers[last]
-                    coarse = max(coarse, _unseen(row, _beyond(row, j, last, work), high - low, tolerance))
-                top -= 1
+                continue
+            if tolerance > 0.0:
+                coarse = max(coarse, _beyond(row, j, last, work) * (high - low))
+        elif verdict == HIDDEN or (verdict == UNKNOWN and not demand.of_state):
+            return low, middle, coarse, pieces
+        elif verdict == NOISY:
+            coarse = max(coarse, _unseen(row, _beyond(row, j, last, work), high - low, tolerance))
+        top -= 1
+    return path.length, path.length, coarse, pieces
+
+
+@njit(**KERNEL)
+def first_hidden(model, program, path, at, demand, work):
+    """The length on which a forcing is explained, of a path, and the first unexplained place after it.
+
+    Both are the path's length if all of it is explained. Returned third is the most that a piece adds to the
+    forcing's integral, as far as bounds can tell, which rounding explains or which is as short as the
+    rounding of time.
+
+    An expression of the state is unexplained only where the middle of a piece is certain to be.
+    """
+    h, nodes, pieces, coarse = path.length, at.nodes, 0, 0.0
+    steady, noise = is_steady(model, program, path, demand.negligible, work)
+    if steady:
+        row = work.registers[_last_row(model.programs, program)]
+        return h, h, _unseen(row, noise, h, demand.tolerance)
+    _take_samples(model, program, path, at, work)
+    if at.seen:
+        before, place = _hidden_from_stages(model, program, path, nodes, demand, work)
+        if place < h:
+            return before, place, 0.0
+    for j in range(len(nodes) - 1):
+        work.intervals[0, 0], work.intervals[0, 1] = nodes[j] * h, nodes[j + 1] * h
+        before, place, rest, pieces = _hidden_between(
+            model, program, path, j, 0 if demand.of_state else pieces, demand, work
+        )
+        coarse = max(coarse, rest)
+        if before < h:
+            return before, place, coarse
     return h, h, coarse

@@ -14,7 +14,7 @@ from hybrid.kernels.events.guards import (
     rounding_band,
     sides_at,
 )
-from hybrid.kernels.events.path import state_at
+from hybrid.kernels.events.path import state_at, time_at
 from hybrid.kernels.events.record import start_record
 from hybrid.kernels.events.resolution import restore_sides
 from hybrid.kernels.events.touches import note_touch, remember_touch, share_with_one_touch
@@ -32,6 +32,7 @@ from hybrid.kernels.steps.step import (
     interpolant_path,
     interpolation_stages,
     moves_nothing,
+    path_of_step,
     rates,
     starting_step,
 )
@@ -99,7 +100,7 @@ def remember_touch_on_step(model, method, run, record, t, h, whole, work):
     place = run.grazing_place * whole
     interpolation_stages(model, method, run.mode, t, h, run.y, work)
     interpolant_path(method, h, run.y, model.dimension, work)
-    state_at(work.path, method.powers.shape[0] - 1, model.dimension, place / h, work.state)
+    state_at(path_of_step(method, t, h, work), model.dimension, place / h, work.state)
     remember_touch(model, run, record, place / h, t + place, work)
 
 
@@ -137,62 +138,70 @@ def find_event(task, h, interpolated):
     rounding of time allows: there the state has reached the guard, and a transition in that direction fires.
     Without one, or if it has just fired, the length is nan.
     """
-    attempts, model, method, run, _, work = task_of(task)
-    tangents = task.tangents
-    mode, t = run.mode, run.phase
+    _, model, method, run, _, work = task_of(task)
+    mode, t, path = run.mode, run.phase, path_of_step(method, run.phase, h, work)
     ignored, touched = NO_TRANSITION, 0.0
     for trial in range(2):
         if not (interpolated and trial == 0):
             interpolation_stages(model, method, mode, t, h, run.y, work)
         if not all_affine(model, mode):
             interpolant_path(method, h, run.y, model.dimension, work)
-        theta, fired, proved, blurred = earliest_crossing(model, method, run, t, h, ignored, touched, work)
+        theta, fired, proved, blurred = earliest_crossing(model, method, run, path, ignored, touched, work)
         if blurred != NO_TRANSITION:
-            side = run.rehearsal[0, blurred]
-            if SHORTER * h > FINEST * measured_time(model, run, mode):
-                restore_sides(model, run)
-                return 0.0, 0.0, NO_TRANSITION
-            length = reach(model, run, blurred, t, h, tangents, work)
-            if length != NOT_THERE:
-                restore_sides(model, run)
-                run.rehearsal[3, blurred] = side
-                rounding = EPSILON * abs(run.phase)
-                returns = run.last_fired == blurred and run.since_entry <= max(h, rounding)
-                if crosses_towards(model.direction[blurred], -side) and not returns:
-                    return 0.0, length, blurred
-                return math.nan, 0.0, NO_TRANSITION
-            attempt_again(attempts, model, method, mode, t, h, run.y, tangents, work)
+            reached, correction, first = reach_blurred(task, h, blurred)
+            if reached != h:
+                return reached, correction, first
         if proved < min(theta, 1.0):
-            attempt_again(attempts, model, method, mode, t, proved * h, run.y, tangents, work)
+            attempt_again(task, proved * h)
             return proved * h, 0.0, NO_TRANSITION
         if fired == NO_TRANSITION:
             break
         side = run.rehearsal[3, fired]
-        rounding = measured_time(model, run, mode)
-        shortened, correction, first = land_on_first(
-            attempts, model, method, run, fired, t, rounding, h, theta, tangents, work
-        )
+        shortened, correction, first = land_on_first(task, fired, h, theta)
         if shortened != NOT_THERE:
             return shortened, correction, first
-        if drowns(model, method, run, fired, t, theta, h, work):
-            attempt_again(attempts, model, method, mode, t, theta * h, run.y, tangents, work)
-            return theta * h, 0.0, fired
-        attempt_again(attempts, model, method, mode, t, h, run.y, tangents, work)
-        if is_beyond(model, run, fired, side, t + h, work):
+        drowned = drowns(model, run, fired, path, theta, work)
+        if not drowned:
+            attempt_again(task, h)
+            drowned = is_beyond(model, run, fired, side, t + h, work)
+        if drowned:
             # Only a flight at the level of rounding lies between: the guard is as zero as it can be there.
-            attempt_again(attempts, model, method, mode, t, theta * h, run.y, tangents, work)
+            attempt_again(task, theta * h)
             return theta * h, 0.0, fired
         ignored, touched = fired, theta
         note_touch(run, fired, theta, 0.0)
     share = share_with_one_touch(run)
     if share < 1.0:
-        attempt_again(attempts, model, method, mode, t, share * h, run.y, tangents, work)
+        attempt_again(task, share * h)
         return share * h, 0.0, NO_TRANSITION
     return h, 0.0, NO_TRANSITION
 
 
 @njit(**KERNEL)
-def drowns(model, method, run, transition, t, theta, h, work):
+def reach_blurred(task, h, blurred):
+    """As ``find_event``, for a step whose error may have made the crossing of ``blurred``.
+
+    The length is ``h``, and the step as it was, if the step cannot be shorter and the guard is not reached.
+    """
+    _, model, _, run, _, work = task_of(task)
+    side = run.rehearsal[0, blurred]
+    if SHORTER * h > FINEST * measured_time(model, run, run.mode):
+        restore_sides(model, run)
+        return 0.0, 0.0, NO_TRANSITION
+    length = reach(model, run, blurred, run.phase, h, task.tangents, work)
+    if length == NOT_THERE:
+        attempt_again(task, h)
+        return h, 0.0, NO_TRANSITION
+    restore_sides(model, run)
+    run.rehearsal[3, blurred] = side
+    returns = run.last_fired == blurred and run.since_entry <= max(h, EPSILON * abs(run.phase))
+    if crosses_towards(model.direction[blurred], -side) and not returns:
+        return 0.0, length, blurred
+    return math.nan, 0.0, NO_TRANSITION
+
+
+@njit(**KERNEL)
+def drowns(model, run, transition, path, theta, work):
     """Whether a flight from a bent guard back to it, to the share ``theta`` of the step, is all rounding.
 
     The slope of the guard has told where such a flight ends; the values of the guard on the way do not.
@@ -201,10 +210,11 @@ def drowns(model, method, run, transition, t, theta, h, work):
         return False
     for part in range(3):
         place = 0.5 * part * theta
-        state_at(work.path, method.powers.shape[0] - 1, model.dimension, place, work.state)
-        value = guard_value(model, transition, t + place * h, work.state, work.scalar)
-        model.guard_gradient(transition, t + place * h, work.state, model.parameters, work.gradient)
-        if abs(value) > rounding_band(model, run, transition, t + place * h, work.state, work):
+        state_at(path, model.dimension, place, work.state)
+        t = time_at(path, place)
+        value = guard_value(model, transition, t, work.state, work.scalar)
+        model.guard_gradient(transition, t, work.state, model.parameters, work.gradient)
+        if abs(value) > rounding_band(model, run, transition, t, work.state, work):
             return False
     return True
 
@@ -246,78 +256,66 @@ def alignment_ratio(method, n, tangents, work):
     return (-0.5 * math.log(product) / CLOSEST) ** (1.0 / method.exponent)
 
 
-@exported(Pair(REAL), Task, REAL)
-def runge_kutta_step(task, remaining):
-    """One step, to the first event on it or to the end of the run; returns a code and the step in time.
+@njit(**KERNEL)
+def makes_ready(task, remaining):
+    """Whether a run has rates and a length for its next step; both are computed after an event."""
+    _, model, method, run, _, work = task_of(task)
+    mode, t, tangents = run.mode, run.phase, task.tangents
+    rates(model, mode, t, run.y, tangents, work.stages[0])
+    if run.next_step <= 0.0:
+        run.next_step = starting_step(model, method, mode, t, run.y, tangents, remaining, work)
+    if not run.next_step > 0.0:
+        return False
+    run.stage = READY
+    return True
 
-    The transition of an event is left in ``run.pending``. A rejected step has the length zero.
+
+@njit(**KERNEL)
+def reject(task, h, ratio):
+    """Make the next step shorter than an attempted one with this error ratio; a code and the step in time.
+
+    Where no step can be shorter, the run ends, unless a guard is there.
     """
-    attempts, model, method, run, record, work = task_of(task)
-    tangents = task.tangents
-    length = model.dimension * (1 + tangents)
-    mode, t = run.mode, run.phase
-    if run.stage == STALE:
-        rates(model, mode, t, run.y, tangents, work.stages[0])
-        if run.next_step <= 0.0:
-            run.next_step = starting_step(model, method, mode, t, run.y, tangents, remaining, work)
-        if not run.next_step > 0.0:
-            return NON_FINITE, 0.0
-        run.stage = READY
-    proposed = min(run.next_step, method.max_step)
-    last = proposed >= remaining
-    h = remaining if last else proposed
-    if is_forced(model, mode):
-        h = attempts.explained_step(model, method, run, h, work)
-        last = last and h == remaining
-    ratio = attempt(attempts, model, method, mode, t, h, run.y, tangents, work)
-    if task.orthonormal != 0 and method.implicit != 0 and ratio <= 1.0:
-        ratio = max(ratio, alignment_ratio(method, model.dimension, tangents, work))
-    run.steps += 1
-    if not ratio <= 1.0:
-        run.rejected += 1
-        shrink = max(SHRINK, SAFETY * ratio ** (-method.exponent)) if ratio > 1.0 else 0.1
-        run.next_step = h * shrink
-        finest = h * shrink <= FINEST * measured_time(model, run, mode)
-        if finest and ratio > 1.0 and model.timed[mode] == 0:
-            finest = moves_nothing(model, run, work.stages[0], h * shrink)
-        if finest or h * shrink < 1e-200:
-            # The field may end at a guard, as ``sqrt(h)`` does at ``h``.
-            correction, run.pending = reach_any(model, run, t, h, tangents, work)
-            if run.pending == NO_TRANSITION:
-                return STEP_TOO_SMALL if ratio > 1.0 else NON_FINITE, 0.0
-            accept(model, method, run, tangents, 0.0, correction, work)
-            return GO_ON, correction
+    _, model, method, run, _, work = task_of(task)
+    mode, tangents = run.mode, task.tangents
+    run.rejected += 1
+    shrink = max(SHRINK, SAFETY * ratio ** (-method.exponent)) if ratio > 1.0 else 0.1
+    run.next_step = h * shrink
+    finest = h * shrink <= FINEST * measured_time(model, run, mode)
+    if finest and ratio > 1.0 and model.timed[mode] == 0:
+        finest = moves_nothing(model, run, work.stages[0], h * shrink)
+    if not (finest or h * shrink < 1e-200):
         return GO_ON, 0.0
-    interpolated = has_terms_in_state(model, mode)
-    if interpolated:
-        interpolation_stages(model, method, mode, t, h, run.y, work)
-        explained = attempts.explained_attempt(model, method, run, h, work)
-        if explained < h:
-            run.rejected += 1
-            run.next_step = explained
-            return GO_ON, 0.0
-    fired, correction, whole = NO_TRANSITION, 0.0, h
-    if model.first_outgoing[mode + 1] > model.first_outgoing[mode]:
-        h, correction, fired = find_event(task, h, interpolated)
-        if math.isnan(h):
-            return STEP_TOO_SMALL, 0.0
-        lost = False
-        for i in range(model.dimension if fired != NO_TRANSITION else 0):
-            lost = lost or math.isnan(work.new[i])
-        # Where the field ends at the guard, a landing may have no value: a shorter step comes nearer to it.
-        if lost or (h == 0.0 and fired == NO_TRANSITION):
-            run.rejected += 1
-            run.next_step = SHORTER * whole
-            return GO_ON, 0.0
-        if run.grazing_place * whole <= h:
-            remember_touch_on_step(model, method, run, record, t, h, whole, work)
-    grow = growth_factor(method, run, whole, max(ratio, 1e-16))
-    run.next_step = max(proposed, whole * grow) if last else whole * grow
-    run.last_step, run.last_ratio = whole, max(ratio, 1e-16)
-    if fired != NO_TRANSITION:
-        run.next_step = min(run.next_step, LONGEST_AFTER_EVENT * h)
-    if fired == NO_TRANSITION and run.first_step[mode] <= 0.0:
-        run.first_step[mode] = h
+    # The field may end at a guard, as ``sqrt(h)`` does at ``h``.
+    correction, run.pending = reach_any(model, run, run.phase, h, tangents, work)
+    if run.pending == NO_TRANSITION:
+        return STEP_TOO_SMALL if ratio > 1.0 else NON_FINITE, 0.0
+    accept(model, method, run, tangents, 0.0, correction, work)
+    return GO_ON, correction
+
+
+@njit(**INLINE)
+def try_shorter(run, h):
+    """Reject an attempted step; the next one has the length ``h``."""
+    run.rejected += 1
+    run.next_step = h
+    return GO_ON, 0.0
+
+
+@njit(**INLINE)
+def is_lost(model, work):
+    """Whether the end of the attempted step has no value."""
+    lost = False
+    for i in range(model.dimension):
+        lost = lost or math.isnan(work.new[i])
+    return lost
+
+
+@njit(**INLINE)
+def take(task, h, correction, fired, whole):
+    """Move the run to the end of the attempted step, of which the length ``h`` of the ``whole`` is taken."""
+    _, model, method, run, record, work = task_of(task)
+    t, tangents = run.phase, task.tangents
     if record.step_phase.shape[0] > 0 and h > 0.0:
         remember_step(model, method, run, record, t, h, work)
     accept(model, method, run, tangents, h, correction, work)
@@ -325,5 +323,53 @@ def runge_kutta_step(task, remaining):
     if fired == NO_TRANSITION:
         if h < whole:
             sides_at(model, run, t + h, work)
-        carry_rates(method, length, work)
+        carry_rates(method, model.dimension * (1 + tangents), work)
+
+
+@exported(Pair(REAL), Task, REAL)
+def runge_kutta_step(task, remaining):
+    """One step, to the first event on it or to the end of the run; returns a code and the step in time.
+
+    The transition of an event is left in ``run.pending``. A rejected step has the length zero.
+    """
+    attempts, model, method, run, record, work = task_of(task)
+    mode, t = run.mode, run.phase
+    if run.stage == STALE and not makes_ready(task, remaining):
+        return NON_FINITE, 0.0
+    proposed = min(run.next_step, method.max_step)
+    last = proposed >= remaining
+    h = remaining if last else proposed
+    if is_forced(model, mode):
+        h = attempts.explained_step(model, method, run, h, work)
+        last = last and h == remaining
+    ratio = attempt(task, h)
+    if task.orthonormal != 0 and method.implicit != 0 and ratio <= 1.0:
+        ratio = max(ratio, alignment_ratio(method, model.dimension, task.tangents, work))
+    run.steps += 1
+    if not ratio <= 1.0:
+        return reject(task, h, ratio)
+    interpolated = has_terms_in_state(model, mode)
+    if interpolated:
+        interpolation_stages(model, method, mode, t, h, run.y, work)
+        explained = attempts.explained_attempt(model, method, run, h, work)
+        if explained < h:
+            return try_shorter(run, explained)
+    fired, correction, whole = NO_TRANSITION, 0.0, h
+    if model.first_outgoing[mode + 1] > model.first_outgoing[mode]:
+        h, correction, fired = find_event(task, h, interpolated)
+        if math.isnan(h):
+            return STEP_TOO_SMALL, 0.0
+        # Where the field ends at the guard, a landing may have no value: a shorter step comes nearer to it.
+        if h == 0.0 if fired == NO_TRANSITION else is_lost(model, work):
+            return try_shorter(run, SHORTER * whole)
+        if run.grazing_place * whole <= h:
+            remember_touch_on_step(model, method, run, record, t, h, whole, work)
+    grow = growth_factor(method, run, whole, max(ratio, 1e-16))
+    run.next_step = max(proposed, whole * grow) if last else whole * grow
+    run.last_step, run.last_ratio = whole, max(ratio, 1e-16)
+    if fired != NO_TRANSITION:
+        run.next_step = min(run.next_step, LONGEST_AFTER_EVENT * h)
+    elif run.first_step[mode] <= 0.0:
+        run.first_step[mode] = h
+    take(task, h, correction, fired, whole)
     return GO_ON, h + correction

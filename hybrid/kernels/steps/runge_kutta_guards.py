@@ -1,6 +1,7 @@
 """Guards along a Runge-Kutta step: the earliest crossing, whether it is resolved, and landing on it."""
 
 import math
+from typing import NamedTuple
 
 from numba import njit
 
@@ -11,6 +12,7 @@ from hybrid.kernels.arithmetic.bernstein import (
     first_crossing,
     stays,
 )
+from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.events.crossings import crossing_on_path
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
@@ -25,8 +27,7 @@ from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, has_
 from hybrid.kernels.events.resolution import (
     MARGIN,
     field_holds,
-    keep_change,
-    keep_crossing,
+    keep_outcome,
     keep_passage,
     keep_side,
     keeps_sign,
@@ -41,8 +42,10 @@ from hybrid.kernels.events.touches import (
 )
 from hybrid.kernels.steps.step import attempt_again
 from hybrid.kernels.types.codes import NO_TRANSITION
+from hybrid.kernels.types.kinds import REAL, TRUTH
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
+from hybrid.kernels.types.task import task_of
 
 # Below this share of the step, one Euler step completes a correction: the error left is its square.
 EULER_IS_ENOUGH = 1e-8
@@ -169,8 +172,75 @@ def is_resolved(model, method, run, transition, t, h, work):
     return before * after > 0.0 and slower * h > MARGIN * moved_by_error(model, work)
 
 
+@njit(**KERNEL)
+def largest_magnitude(coefficients, degree):
+    """The largest magnitude of the coefficients of a polynomial."""
+    largest = 0.0
+    for i in range(degree + 1):
+        largest = max(largest, abs(coefficients[i]))
+    return largest
+
+
+@njit(**KERNEL)
+def crossing_of_affine(model, method, run, transition, path, end, work):
+    """Where an affine guard crosses on a step, and its side after.
+
+    Returned first is whether the guard may have left its side, and last whether the error of the step hides
+    that. ``end`` is the value at the end of the step of a guard of the order ``BY_STEP``.
+    """
+    t, h, hidden = path.start, path.pace, 0.0
+    on_guard, side = run.on_guard[transition], run.side[transition]
+    start = 0.0 if on_guard > 0 else guard_value(model, transition, t, run.y, work.scalar)
+    degree = affine_polynomial(model, method, transition, t, h, run.y, start, work)
+    error = error_band(method, run, work.gradient, model.dimension)
+    if on_guard > 0:
+        band = rounding_on_step(model, run, transition, t, h, work)
+        if largest_magnitude(work.polynomial, degree) <= band:
+            return False, NO_ROOT, side, False
+        run.on_guard[transition] = 0
+        if on_guard == BY_STEP:
+            hidden = hidden_share(work.polynomial, degree, band, error, end, work.stack)
+            if has_just_fired(run, transition, on_guard):
+                side = 0
+    known_roots = on_guard if on_guard != BY_STEP else 0
+    for _ in range(known_roots):
+        degree = divide_by_theta(work.polynomial, degree)
+    if stays(work.polynomial, degree, side, error):
+        return False, NO_ROOT, side, False
+    unsure = asks_error(run, on_guard) and not outweighs_error(model, run, side * work.polynomial[0], h, work)
+    direction, before = model.direction[transition], side
+    theta, side = first_crossing(work.polynomial, degree, side, direction, work.stack)
+    if theta != NO_ROOT or side != before:
+        keep_passage(run, transition, direction, work.polynomial, degree, before, hidden, work.stack)
+    if on_guard == BY_STEP:
+        theta += hidden * (1.0 - theta) if 0.0 < theta < NO_ROOT else 0.0
+        degree = affine_polynomial(model, method, transition, t, h, run.y, 0.0, work)
+    note_touches(run, transition, degree, known_roots, hidden, theta, error, work)
+    return True, theta, side, unsure
+
+
+@njit(**KERNEL)
+def crossing_on_step(model, method, run, transition, path, work):
+    """Where a guard crosses, the share of the step that is proved, and whether the crossing is resolved."""
+    t, h, on_guard, share = path.start, path.pace, run.on_guard[transition], 1.0
+    end = guard_value(model, transition, t + h, work.new, work.scalar) if on_guard == BY_STEP else 0.0
+    if model.affine_guard[transition] == 1:
+        leaves, theta, side, unsure = crossing_of_affine(model, method, run, transition, path, end, work)
+        if not leaves:
+            return NO_ROOT, 1.0, True
+    else:
+        known = asks_error(run, on_guard)
+        unsure = known and not leaves_as_known(model, run, transition, on_guard, t, h, work)
+        theta, side, share = crossing_on_path(model, method, run, transition, path, end, work)
+    if underflows(model, transition, t, run.y, t + h, work.new, work.scalar):
+        return NO_ROOT, share, True
+    hidden = unsure or (on_guard == 0 and not is_resolved(model, method, run, transition, t, h, work))
+    keep_outcome(run, transition, theta, side)
+    return theta, share, not hidden
+
+
 @njit(**INLINE)
-def earliest_crossing(model, method, run, t, h, ignored, touched, work):
+def earliest_crossing(model, method, run, path, ignored, touched, work):
     """Earliest crossing on the attempted step over the mode's guards but ``ignored``, and its transition.
 
     The guard of ``ignored`` touches zero at the share ``touched`` of the step. Returns
@@ -180,80 +250,22 @@ def earliest_crossing(model, method, run, t, h, ignored, touched, work):
     guards without a crossing are brought up to date, to the end of the step, and guards that were left are no
     longer held to be zero at its start; ``resolution.restore_sides`` takes that back. For a guard with a
     crossing, ``run.rehearsal[3]`` holds its side before that.
-    ``work.path`` must hold the interpolant if any guard of the mode is not affine.
+    The ``path`` must be the interpolant if any guard of the mode is not affine.
     """
-    mode, degree_of_path = run.mode, method.powers.shape[0] - 1
+    mode = run.mode
     earliest, fired, proved, blurred = NO_ROOT, NO_TRANSITION, 1.0, NO_TRANSITION
     forget_touches(run)
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         keep_side(run, transition)
         if transition == ignored:
-            leave_guard(model, run, transition, t + h, work)
+            leave_guard(model, run, transition, path.start + path.pace, work)
             note_touch(run, transition, touched, 0.0)
             continue
-        on_guard = run.on_guard[transition]
-        side = run.side[transition]
-        end = guard_value(model, transition, t + h, work.new, work.scalar) if on_guard == BY_STEP else 0.0
-        if model.affine_guard[transition] == 1:
-            start = 0.0 if on_guard > 0 else guard_value(model, transition, t, run.y, work.scalar)
-            degree = affine_polynomial(model, method, transition, t, h, run.y, start, work)
-            error, hidden = error_band(method, run, work.gradient, model.dimension), 0.0
-            if on_guard > 0:
-                band, farthest = rounding_on_step(model, run, transition, t, h, work), 0.0
-                for i in range(degree + 1):
-                    farthest = max(farthest, abs(work.polynomial[i]))
-                if farthest <= band:
-                    continue
-                run.on_guard[transition] = 0
-                if on_guard == BY_STEP:
-                    hidden = hidden_share(work.polynomial, degree, band, error, end, work.stack)
-                    if has_just_fired(run, transition, on_guard):
-                        side = 0
-            known_roots = on_guard if on_guard != BY_STEP else 0
-            for _ in range(known_roots):
-                degree = divide_by_theta(work.polynomial, degree)
-            if stays(work.polynomial, degree, side, error):
-                continue
-            unsure = asks_error(run, on_guard) and not outweighs_error(
-                model, run, side * work.polynomial[0], h, work
-            )
-            direction, before = model.direction[transition], side
-            theta, side = first_crossing(work.polynomial, degree, side, direction, work.stack)
-            if theta != NO_ROOT or side != before:
-                keep_passage(run, transition, direction, work.polynomial, degree, before, hidden, work.stack)
-            if on_guard == BY_STEP:
-                theta += hidden * (1.0 - theta) if 0.0 < theta < NO_ROOT else 0.0
-                degree = affine_polynomial(model, method, transition, t, h, run.y, 0.0, work)
-            note_touches(run, transition, degree, known_roots, hidden, theta, error, work)
-        else:
-            unsure = asks_error(run, on_guard) and not leaves_as_known(
-                model, run, transition, on_guard, t, h, work
-            )
-            theta, side, share = crossing_on_path(
-                model,
-                method,
-                run,
-                transition,
-                work.path,
-                degree_of_path,
-                -1,
-                t,
-                h,
-                1.0,
-                end,
-                False,
-                work,
-            )
-            proved = min(proved, share)
-        if underflows(model, transition, t, run.y, t + h, work.new, work.scalar):
-            continue
-        if unsure or (on_guard == 0 and not is_resolved(model, method, run, transition, t, h, work)):
+        theta, share, resolved = crossing_on_step(model, method, run, transition, path, work)
+        proved = min(proved, share)
+        if not resolved:
             blurred = transition
-        if theta == NO_ROOT:
-            keep_change(run, transition, side)
-            continue
-        keep_crossing(run, transition, theta, side)
         if theta < earliest:
             earliest, fired = theta, transition
     set_sides_before(model, run, earliest)
@@ -293,51 +305,86 @@ def reach_any(model, run, t, h, tangents, work):
     return NOT_THERE, NO_TRANSITION
 
 
+class Lengths(NamedTuple):
+    """The lengths of a step between which its end passes a guard.
+
+    The guard has been seen on its side at ``low`` if ``before``, and not on it at ``high`` if ``after``.
+    """
+
+    low: REAL
+    high: REAL
+    before: TRUTH
+    after: TRUTH
+
+
+@njit(**INLINE)
+def narrowed(bracket, length, short):
+    """A bracket after a length that is too short, or long enough."""
+    low, high, before, after = bracket
+    if short:
+        return Lengths(length, high, True, after)
+    return Lengths(low, length, before, True)
+
+
 @njit(**KERNEL)
-def land(parts, model, method, transition, side, mode, t, rounding, h, theta, y, tangents, work):
+def searched_at(bracket, begins, distance, h):
+    """The length at which the other side of a guard is searched, at a distance; with what is known then.
+
+    The length is ``NOT_THERE`` if no place is left. The guard is on its side at the start if it ``begins``
+    there.
+    """
+    low, high, before, after = bracket
+    length = low + distance if before else high - distance
+    if before and low < h <= length:
+        # The end of the step is the farthest place.
+        return h, bracket
+    if begins and after and length <= low:
+        # The start of the step is the farthest place on this side.
+        return 0.5 * high, Lengths(low, high, True, after)
+    return length if low < length < high else NOT_THERE, bracket
+
+
+@njit(**KERNEL)
+def land(task, transition, side, h, theta):
     """Shorten the step so that it ends on the guard, with the end in ``work.new``.
 
     The step is taken again up to the root of the interpolant and corrected by Newton's method on the guard,
     so that the state and the tangents at the event carry the error of the method, not that of its
     interpolant. The guard comes from ``side``; Newton is kept in a bracket as soon as both sides have been
-    seen. ``rounding`` is the time whose rounding limits the steps. Returns the length of the step last taken
-    and the small Euler step that completed it; ``NOT_THERE`` instead of the length if the guard of the step,
-    unlike that of its interpolant, only comes close to zero.
+    seen. Returns the length of the step last taken and the small Euler step that completed it; ``NOT_THERE``
+    instead of the length if the guard of the step, unlike that of its interpolant, only comes close to zero.
     """
-    s = method.b.shape[0]
-    low, high = 0.0, h
-    begins = guard_value(model, transition, t, y, work.scalar) * side > 0.0
+    _, model, method, run, _, work = task_of(task)
+    t, s, rounding = run.phase, method.b.shape[0], measured_time(model, run, run.mode)
+    begins = guard_value(model, transition, t, run.y, work.scalar) * side > 0.0
     # Along the step an affine guard is as smooth as the state. Other guards may have kinks, jumps and flat
     # roots, and may cross more than once on the step. The ends of the step are then no bracket.
     smooth = model.affine_guard[transition] == 1
-    before = smooth and begins
     after = smooth and guard_value(model, transition, t + h, work.new, work.scalar) * side <= 0.0
+    bracket = Lengths(0.0, h, smooth and begins, after)
     length, last, reach = theta * h, math.inf, FIRST_REACH * h
     for trial in range(MOST_LANDINGS):
-        attempt_again(parts, model, method, mode, t, length, y, tangents, work)
+        attempt_again(task, length)
         if length == 0.0:
             return 0.0, 0.0
         value = guard_value(model, transition, t + length, work.new, work.scalar)
         speed = guard_speed(model, transition, t + length, work.new, work.stages[s], work.gradient)
         correction = -value / speed
         # The next correction is predicted from the last two, because Newton's method converges quadratically.
-        next_one = abs(correction) ** 3
-        converges = smooth or (trial > 0 and next_one <= EPSILON * length * last * last)
+        converges = smooth or (trial > 0 and abs(correction) ** 3 <= EPSILON * length * last * last)
         if speed * side < 0.0 and abs(correction) <= EULER_IS_ENOUGH * length and converges:
-            for i in range(model.dimension * (1 + tangents)):
+            for i in range(model.dimension * (1 + task.tangents)):
                 work.new[i] += correction * work.stages[s, i]
             return length, correction
         # A guard that stays zero for a while changes its side at the end of that.
         at_rest = not smooth and value == 0.0 and speed == 0.0
         # A guard without a value has not crossed yet if the interpolant crosses farther on.
-        if value * side > 0.0 or at_rest or (math.isnan(value) and length < theta * h):
-            low, before = length, True
-        else:
-            high, after = length, True
-        finest = 2.0 * EPSILON * (max(high, rounding) if smooth else high)
-        if before and after and high - low <= finest:
+        short = value * side > 0.0 or at_rest or (math.isnan(value) and length < theta * h)
+        bracket = narrowed(bracket, length, short)
+        low, high, closed = bracket.low, bracket.high, bracket.before and bracket.after
+        if closed and high - low <= 2.0 * EPSILON * (max(high, rounding) if smooth else high):
             if length != high:
-                attempt_again(parts, model, method, mode, t, high, y, tangents, work)
+                attempt_again(task, high)
             return high, 0.0
         newton = length + correction
         slow = trial >= MOST_LANDINGS // 2 if smooth else trial > 2 and not abs(correction) <= 0.5 * last
@@ -347,21 +394,15 @@ def land(parts, model, method, transition, side, mode, t, rounding, h, theta, y,
         trusted = smooth or abs(correction) <= FARTHEST * h
         if low < newton < high and trusted and not slow:
             length, last = newton, abs(correction)
-        elif before and after:
+        elif closed:
             length = 0.5 * (low + high)
         elif smooth:
             break
         else:
             # Only one side is known: search the other side at growing distances.
-            length = low + reach if before else high - reach
+            length, bracket = searched_at(bracket, begins, reach, h)
             reach *= 8.0
-            if before and low < h <= length:
-                # The end of the step is the farthest place.
-                length = h
-            elif begins and after and length <= low:
-                # The start of the step is the farthest place on this side.
-                before, length = True, 0.5 * high
-            elif not low < length < high:
+            if length == NOT_THERE:
                 break
     return NOT_THERE, 0.0
 
@@ -391,32 +432,26 @@ def passed_before(model, run, fired, t, work):
 
 
 @njit(**KERNEL)
-def land_on_first(parts, model, method, run, fired, t, rounding, h, theta, tangents, work):
+def land_on_first(task, fired, h, theta):
     """Land on the guard of ``fired``, or on one that the landing shows to be crossed before.
 
     The error of the interpolant may put guards that cross almost together in the wrong order. Returns the
     lengths as ``land`` does, and the transition.
     """
-    mode, side = run.mode, run.rehearsal[3, fired]
-    length, correction = land(
-        parts, model, method, fired, side, mode, t, rounding, h, theta, run.y, tangents, work
-    )
+    _, model, _, run, _, work = task_of(task)
+    mode = run.mode
+    length, correction = land(task, fired, run.rehearsal[3, fired], h, theta)
     for _ in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         if not length > 0.0:
             break
-        other = passed_before(model, run, fired, t + length + correction, work)
+        other = passed_before(model, run, fired, run.phase + length + correction, work)
         if other == NO_TRANSITION:
             break
-        side, end = run.rehearsal[3, other], length
-        length, correction = land(
-            parts, model, method, other, side, mode, t, rounding, end, 1.0, run.y, tangents, work
-        )
+        end = length
+        length, correction = land(task, other, run.rehearsal[3, other], end, 1.0)
         if length == NOT_THERE:
             # The guard only comes close to zero: the landing before stands.
-            side = run.rehearsal[3, fired]
-            length, correction = land(
-                parts, model, method, fired, side, mode, t, rounding, end, 1.0, run.y, tangents, work
-            )
+            length, correction = land(task, fired, run.rehearsal[3, fired], end, 1.0)
             break
         fired = other
     return length, correction, fired

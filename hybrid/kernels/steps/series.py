@@ -17,7 +17,7 @@ from hybrid.kernels.arithmetic.powers import power_of_two
 from hybrid.kernels.events.derivatives import speed_rounding
 from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced, sides_at
 from hybrid.kernels.events.onset import BY_SPEED
-from hybrid.kernels.events.path import state_at, time_at, value_at
+from hybrid.kernels.events.path import state_at, time_at, up_to, value_at
 from hybrid.kernels.events.record import start_record
 from hybrid.kernels.events.resolution import restore_sides
 from hybrid.kernels.events.touches import remember_touch
@@ -26,6 +26,8 @@ from hybrid.kernels.steps.series_guards import earliest_on_series, powers_on_ste
 from hybrid.kernels.steps.series_length import (
     EXACT_TOLERANCE,
     MOST_BITS,
+    Columns,
+    Tolerance,
     is_regular,
     longest_step,
     within_floats,
@@ -48,7 +50,7 @@ from hybrid.kernels.types.codes import (
     STEP_TOO_SMALL,
     WIDE,
 )
-from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.layout import EPSILON, Path
 from hybrid.kernels.types.options import INLINE, KERNEL
 from hybrid.kernels.types.task import task_of
 
@@ -58,6 +60,8 @@ MOST_HALVINGS = 1000
 # Share of a step that is tried next if the end of the series hides on which side of a guard the step ends.
 SHORTER = 0.75
 MOST_SHORTER = 100
+# Shortest step, in units of the rounding of time.
+FINEST = 4.0 * EPSILON
 # Rounding of a state by which the noise of its field is measured.
 ROUNDING = 8.0 * EPSILON
 # Largest correction of a landing, as a share of the step.
@@ -70,14 +74,20 @@ AHEAD = 0.25
 NEXT_TO_NOTHING = 1e-10
 
 
+@njit(**INLINE)
+def number_of_guards(model, mode):
+    """How many guards the series of a mode may hold."""
+    return model.first_outgoing[mode + 1] - model.first_outgoing[mode]
+
+
 @njit(**KERNEL)
-def followed(model, method, run, order, t, h, work):
-    """The length up to ``h`` on which the series of the state has the field as its derivative.
+def followed(model, method, run, path, work):
+    """The length of a path on which the series of the state has the field as its derivative.
 
     The terms that were left out grow fastest, so the end of the step and a place before it tell. What
     rounding of the state makes of the field is no misfit.
     """
-    n, series = model.dimension, work.series
+    n, series, order, t, h = model.dimension, path.powers, path.degree, path.start, path.length
     state, field, other = work.trial, work.stages[0], work.stages[1]
     for _ in range(MOST_HALVINGS):
         follows = True
@@ -101,11 +111,12 @@ def followed(model, method, run, order, t, h, work):
 
 
 @njit(**KERNEL)
-def step_until(series, clock, order, h, remaining, work):
+def step_until(path, remaining, work):
     """Shorten a step on the clock of a desingularised mode so that it does not pass the end of the run.
 
     Beyond a zero of the root, where the mode ends, that clock would run backwards.
     """
+    series, clock, order, h = path.powers, path.clock, path.degree, path.length
     degree = powers_on_step(series, whole_registers(clock + 2, WIDE), order, h, 0, work.polynomial)
     to_bernstein(work.polynomial, degree)
     theta, _ = first_crossing(work.polynomial, degree, 1, -1, work.stack)
@@ -116,12 +127,12 @@ def step_until(series, clock, order, h, remaining, work):
 
 
 @njit(**INLINE)
-def accept_series(model, run, tangents, order, h, work):
-    """Move the state and the tangent vectors to ``h`` on the series, and the divergence's integral.
+def accept_series(model, run, tangents, path, work):
+    """Move the state and the tangent vectors to the end of a path, and the divergence's integral.
 
-    The values of the state at ``h``, and what they are sums of, have been left behind the series.
+    The values of the state there, and what they are sums of, have been left behind the series.
     """
-    n, series = model.dimension, work.series
+    n, series, order = model.dimension, work.series, path.degree
     mode = run.mode
     first, last = model.first_outgoing[mode], model.first_outgoing[mode + 1]
     on_guard = 0
@@ -135,15 +146,21 @@ def accept_series(model, run, tangents, order, h, work):
         run.divergence += series[order + 1, n + last - first + 1]
         start, stride = model.tangent_start, model.tangent_columns[mode]
         for g in range(whole_registers(tangents, NARROW) // NARROW):
-            evaluate(series, order, h, start + g * stride, NARROW * n)
+            evaluate(series, order, path.length, start + g * stride, NARROW * n)
         gather_tangents(series, order + 1, n, start, stride, run.y[: n * (1 + tangents)])
 
 
 @njit(**KERNEL)
-def remember_series(model, run, record, order, t, h, span, clock, work):
+def remember_series(model, run, record, path, span):
     """Write a step along the series into the record: the state and time as polynomials in a share of it."""
-    slot, n = start_record(run, record, t, span), model.dimension
-    rows, series = record.step_coefficients[slot], work.series
+    slot, n = start_record(run, record, path.start, span), model.dimension
+    rows, series, order, h, clock = (
+        record.step_coefficients[slot],
+        path.powers,
+        path.degree,
+        path.length,
+        path.clock,
+    )
     power = 1.0
     for o in range(order + 1):
         for i in range(n):
@@ -214,123 +231,169 @@ def project_on_guard(model, run, transition, t, work):
         run.y[i] -= value * work.gradient[i] / square
 
 
-@njit(**KERNEL)
-def series_step(task, remaining):
-    """One step, to the first event on it or to the end of the run; returns a code and the step in time.
-
-    The transition of an event is left in ``run.pending``.
-    """
-    attempts, model, method, run, record, work = task_of(task)
-    n, tangents = model.dimension, task.tangents
-    mode, t, series = run.mode, run.phase, work.series
-    kind, degree = model.propagator[mode], model.degree[mode]
-    exact = kind == EXACT
-    order = HIGHEST_ORDER if exact else method.order
-    if degree > 0:
-        order = degree
-    guards = model.first_outgoing[mode + 1] - model.first_outgoing[mode]
-    clock = n + guards if kind == DESINGULARISED else -1
-    # State, guards, clock and divergence are evaluated together, in whole vectors.
-    front = whole_registers(n + guards + 2, NARROW)
+@njit(**INLINE)
+def expanded(model, method, run, tangents, work):
+    """The path of the series from the state on, without an end."""
+    mode, n, kind = run.mode, model.dimension, model.propagator[run.mode]
+    order = HIGHEST_ORDER if kind == EXACT else method.order
+    if model.degree[mode] > 0:
+        order = model.degree[mode]
+    clock = n + number_of_guards(model, mode) if kind == DESINGULARISED else -1
     if kind in (DESINGULARISED, ROOTED):
-        set_origins(model, run, order, series)
+        set_origins(model, run, order, work.series)
     # A run may be taken on without its tangent vectors: the columns are those of what is passed.
-    model.series(mode, t, run.y[: n * (1 + tangents)], model.parameters, order, series)
-    run.steps += 1
-    rtol, atol = (EXACT_TOLERANCE, 0.0) if exact else (method.rtol, method.atol)
-    h, last, growth = math.inf, 0.0, 0.0
-    if degree == 0:
-        start, stride = model.tangent_start, model.tangent_columns[mode]
+    model.series(mode, run.phase, run.y[: n * (1 + tangents)], model.parameters, order, work.series)
+    return Path(work.series, order, clock, run.phase, 1.0, math.inf, kind == EXACT)
+
+
+@njit(**INLINE)
+def trusted(task, path, remaining):
+    """The part of a path on which its series are the solution; without one, its length is not positive."""
+    attempts, model, method, run, _, work = task_of(task)
+    mode, n, tangents, series = run.mode, model.dimension, task.tangents, path.powers
+    order, clock, h, last, growth = path.degree, path.clock, math.inf, 0.0, 0.0
+    rtol, atol = (EXACT_TOLERANCE, 0.0) if path.exact else (method.rtol, method.atol)
+    tolerance, polynomial = Tolerance(rtol, atol, path.exact), model.degree[mode] > 0
+    if not polynomial:
         groups = whole_registers(tangents, NARROW) // NARROW
-        h, last, growth = longest_step(
-            series, n, start, stride, groups, order, rtol, atol, exact, work.weights
-        )
+        columns = Columns(n, model.tangent_start, model.tangent_columns[mode], groups)
+        h, last, growth = longest_step(series, columns, order, tolerance, work.weights)
         reach = power_of_two(MOST_BITS / order)
         if not 1.0 < h * reach < reach * reach:
-            order, h, last, growth = within_floats(
-                series, n, start, stride, groups, order, rtol, atol, exact, work.weights
-            )
-    if not h > 0.0 or (model.fragile[mode] == 1 and clock < 0 and moves_nothing(model, run, series[1], h)):
-        return NON_FINITE, 0.0
+            order, h, last, growth = within_floats(series, columns, order, tolerance, work.weights)
+    fragile = model.fragile[mode] == 1 and clock < 0
+    if not h > 0.0 or (fragile and moves_nothing(model, run, series[1], h)):
+        return up_to(path, 0.0)
     if clock < 0:
         h = min(h, method.max_step, remaining, as_far_as_last_time(model, run, mode))
         if not h < 1e100:
             h = min(h, unhurried(series, n, run))
     else:
         h = min(h, 1e100)
+    path = Path(series, order, clock, path.start, 1.0, h, path.exact)
     if is_forced(model, mode):
-        h = attempts.explained_series(model, method, run, tangents, order, clock, h, work)
-        if not h > 0.0:
-            return NON_FINITE, 0.0
-    elif (
-        degree == 0
-        and clock < 0
-        and not is_regular(series, n, order, rtol, exact, work.weights, last, growth)
-    ):
-        h = followed(model, method, run, order, t, h, work)
-    evaluate_with_sizes(series, order, h, 0, front)
+        return up_to(path, attempts.explained_series(model, method, run, tangents, path, work))
+    if polynomial or clock >= 0 or is_regular(series, n, order, tolerance, last, growth, work.weights):
+        return path
+    return up_to(path, followed(model, method, run, path, work))
+
+
+@njit(**INLINE)
+def evaluate_end(model, mode, path):
+    """Write the values at the end of a path behind its series, and what these are sums of.
+
+    State, guards, clock and divergence are evaluated together, in whole vectors.
+    """
+    front = whole_registers(model.dimension + number_of_guards(model, mode) + 2, NARROW)
+    evaluate_with_sizes(path.powers, path.degree, path.length, 0, front)
+
+
+@njit(**INLINE)
+def is_finite(path, n):
+    """Whether the state at the end of a path is finite."""
     total = 0.0
     for i in range(n):
-        total += series[order + 2, i]
-    if not total < math.inf:
+        total += path.powers[path.degree + 2, i]
+    return total < math.inf
+
+
+@njit(**INLINE)
+def up_to_event(task, path):
+    """The path up to its first event, the transition, and whether it is cut before, where it is proved."""
+    attempts, model, method, run, record, work = task_of(task)
+    mode, finest = run.mode, FINEST * measured_time(model, run, run.mode)
+    theta, fired, proved, blurred = earliest_on_series(attempts, model, method, run, path, work)
+    for _ in range(MOST_SHORTER):
+        if blurred == NO_TRANSITION or SHORTER * path.length <= finest:
+            break
+        path = up_to(path, SHORTER * path.length)
+        evaluate_end(model, mode, path)
+        restore_sides(model, run)
+        theta, fired, proved, blurred = earliest_on_series(attempts, model, method, run, path, work)
+    end = min(theta, proved, 1.0)
+    if run.grazing_place <= end:
+        s = run.grazing_place * path.length
+        state_at(path, model.dimension, s, work.state)
+        remember_touch(model, run, record, run.grazing_place / end, time_at(path, s), work)
+    cut = proved < min(theta, 1.0)
+    if cut:
+        theta, fired = proved, NO_TRANSITION
+    if cut or fired != NO_TRANSITION:
+        path = up_to(path, path.length * theta)
+        evaluate_end(model, mode, path)
+        run.pending = fired
+    return path, fired, cut
+
+
+@njit(**INLINE)
+def time_taken(path, remaining, finest, ends):
+    """The time along a path, all that is ``remaining`` if less than its rounding would be left.
+
+    An event ``ends`` the path before, or the part that is proved. ``finest`` is the rounding of the time.
+    """
+    if path.clock < 0:
+        return path.length
+    span = min(path.powers[path.degree + 1, path.clock], remaining)
+    # Where the clock shows the end up to its rounding, no step leads through what would be left.
+    rounding = max(finest, FINEST * path.powers[path.degree + 2, path.clock])
+    return remaining if not ends and remaining - span <= rounding else span
+
+
+@njit(**KERNEL)
+def land(model, run, tangents, fired, path, span, work):
+    """Bring the state at the end of a path onto the guard that ends it; returns the time that this takes."""
+    t, on_clock = path.start + span, path.clock >= 0
+    if model.propagator[run.mode] == ROOTED:
+        project_on_guard(model, run, fired, t, work)
+        return 0.0
+    if not on_clock and model.affine_guard[fired] == 1:
+        return 0.0
+    # What the error of the root makes of the time is less than the stay in the mode.
+    longest = run.since_entry + span if on_clock else CLOSE * span
+    moved = 0 if on_clock and model.guard_in_series[fired] == 1 else tangents
+    return reach_guard(model, run, moved, fired, t, longest, work)
+
+
+@njit(**KERNEL)
+def series_step(task, remaining):
+    """One step, to the first event on it or to the end of the run; returns a code and the step in time.
+
+    The transition of an event is left in ``run.pending``.
+    """
+    _, model, method, run, record, work = task_of(task)
+    mode, n, tangents, guards = run.mode, model.dimension, task.tangents, number_of_guards(model, run.mode)
+    path = expanded(model, method, run, tangents, work)
+    run.steps += 1
+    path = trusted(task, path, remaining)
+    if not path.length > 0.0:
         return NON_FINITE, 0.0
+    evaluate_end(model, mode, path)
+    if not is_finite(path, n):
+        return NON_FINITE, 0.0
+    series, order, clock = path.powers, path.degree, path.clock
     if clock >= 0 and not series[order + 2, clock] < remaining:
-        h = step_until(series, clock, order, h, remaining, work)
-        evaluate_with_sizes(series, order, h, 0, front)
+        path = up_to(path, step_until(path, remaining, work))
+        evaluate_end(model, mode, path)
     fired, cut = NO_TRANSITION, False
     if guards > 0:
-        theta, fired, proved, blurred = earliest_on_series(
-            attempts, model, method, run, order, t, h, clock, work
-        )
-        for _ in range(MOST_SHORTER):
-            if blurred == NO_TRANSITION or SHORTER * h <= 4.0 * EPSILON * measured_time(model, run, mode):
-                break
-            h *= SHORTER
-            evaluate_with_sizes(series, order, h, 0, front)
-            restore_sides(model, run)
-            theta, fired, proved, blurred = earliest_on_series(
-                attempts, model, method, run, order, t, h, clock, work
-            )
-        end = min(theta, proved, 1.0)
-        if run.grazing_place <= end:
-            s = run.grazing_place * h
-            state_at(series, order, n, s, work.state)
-            place = run.grazing_place / end
-            remember_touch(model, run, record, place, time_at(series, order, clock, t, 1.0, s), work)
-        cut = proved < min(theta, 1.0)
-        if cut:
-            theta, fired = proved, NO_TRANSITION
-        if cut or fired != NO_TRANSITION:
-            h *= theta
-            evaluate_with_sizes(series, order, h, 0, front)
-            run.pending = fired
-    finest = 4.0 * EPSILON * measured_time(model, run, mode)
-    span = h if clock < 0 else min(series[order + 1, clock], remaining)
-    if clock >= 0:
-        # Where the clock shows the end up to its rounding, no step leads through what would be left.
-        rounding = max(finest, 4.0 * EPSILON * series[order + 2, clock])
-        if fired == NO_TRANSITION and not cut and remaining - span <= rounding:
-            span = remaining
+        path, fired, cut = up_to_event(task, path)
+    finest = FINEST * measured_time(model, run, mode)
+    span = time_taken(path, remaining, finest, cut or fired != NO_TRANSITION)
     stays = fired == NO_TRANSITION and not span > finest and span < remaining
-    if stays and (model.timed[mode] == 1 or moves_nothing(model, run, series[1], h)):
+    if stays and (model.timed[mode] == 1 or moves_nothing(model, run, series[1], path.length)):
         return STEP_TOO_SMALL, 0.0
     if record.step_phase.shape[0] > 0 and span > 0.0:
-        remember_series(model, run, record, order, t, h, span, clock, work)
-    accept_series(model, run, tangents, order, h, work)
+        remember_series(model, run, record, path, span)
+    accept_series(model, run, tangents, path, work)
     if order < method.order:
         # The next series looks for its root behind a series of the full order.
         for column in range(n, n + guards):
             series[method.order + 1, column] = series[order + 1, column]
     run.stage = READY
     if cut:
-        sides_at(model, run, t + span, work)
-    if fired != NO_TRANSITION and kind == ROOTED:
-        project_on_guard(model, run, fired, t + span, work)
-    elif fired != NO_TRANSITION and (clock >= 0 or model.affine_guard[fired] == 0):
-        # What the error of the root makes of the time is less than the stay in the mode.
-        longest = run.since_entry + span if clock >= 0 else CLOSE * span
-        moved = 0 if clock >= 0 and model.guard_in_series[fired] == 1 else tangents
-        span += reach_guard(model, run, moved, fired, t + span, longest, work)
+        sides_at(model, run, path.start + span, work)
+    if fired != NO_TRANSITION:
+        span += land(model, run, tangents, fired, path, span, work)
     return GO_ON, span
 
 

@@ -1,6 +1,7 @@
 """Guards along a series: their polynomials, proofs that they have no zero, the earliest crossing."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -25,8 +26,7 @@ from hybrid.kernels.events.path import time_at
 from hybrid.kernels.events.resolution import (
     MARGIN,
     UNDERFLOW,
-    keep_change,
-    keep_crossing,
+    keep_outcome,
     keep_passage,
     keep_side,
     keeps_sign,
@@ -34,7 +34,7 @@ from hybrid.kernels.events.resolution import (
     underflows,
 )
 from hybrid.kernels.events.touches import forget_touches, note_touches, share_with_one_touch
-from hybrid.kernels.steps.series_roots import root_between
+from hybrid.kernels.steps.series_roots import Bracket, root_between
 from hybrid.kernels.types.codes import (
     DESINGULARISED,
     EXACT,
@@ -43,6 +43,7 @@ from hybrid.kernels.types.codes import (
     NO_TRANSITION,
     ROOTED,
 )
+from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -254,12 +255,12 @@ def underflows_on_series(series, column, order):
 
 
 @njit(**KERNEL)
-def is_resolved_by_series(model, run, transition, column, order, t, h, clock, on_guard, work):
+def is_resolved_by_series(model, run, transition, column, path, on_guard, work):
     """Whether the end of the series leaves the sign of a guard at both ends of the step alone.
 
     As ``runge_kutta_guards.is_resolved``. ``column`` is that of the guard, or -1 if the guard is no series.
     """
-    n, series = model.dimension, work.series
+    n, series, order, t, h = model.dimension, path.powers, path.degree, path.start, path.length
     if model.degree[run.mode] > 0 or on_guard > 0:
         # A polynomial has no other terms; the derivatives of a guard that is zero tell its side.
         return True
@@ -282,14 +283,152 @@ def is_resolved_by_series(model, run, transition, column, order, t, h, clock, on
         size = max(abs(series[0, i]), abs(series[1, i] * h), abs(work.trial[i]))
         error = last_terms(series, i, order, h)
         work.field_after[i] = error if error > ROUNDING_OF_STATE * EPSILON * size else 0.0
-    later = time_at(series, order, clock, t, 1.0, h)
+    later = time_at(path, h)
     return keeps_sign(model, transition, t, run.y, work) and keeps_sign(
         model, transition, later, work.trial, work
     )
 
 
 @njit(**KERNEL)
-def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
+def crossing_beside(attempts, model, method, run, transition, path, work):
+    """Where a guard that is no series crosses, the share of the step that is proved, if it is resolved."""
+    on_guard, later = run.on_guard[transition], time_at(path, path.length)
+    for i in range(model.dimension):
+        work.trial[i] = path.powers[path.degree + 1, i]
+    theta, share = attempts.crossing_beside_series(model, method, run, transition, path, work)
+    side = run.rehearsal[3, transition]
+    run.rehearsal[3, transition] = 0
+    if underflows(model, transition, path.start, run.y, later, work.trial, work.scalar):
+        return NO_ROOT, share, True
+    resolved = is_resolved_by_series(model, run, transition, -1, path, on_guard, work)
+    keep_outcome(run, transition, theta, side)
+    return theta, share, resolved
+
+
+class Sought(NamedTuple):
+    """A guard that is a series, and what its crossing on a step is sought with.
+
+    ``side`` is its sign before, zero if that is open, and ``on_guard`` its order at the start. So many roots
+    at zero are ``known``, where its first powers are not ``noisy``. Within ``rounding`` the guard is zero;
+    within ``band`` it may touch zero.
+    """
+
+    transition: INTEGER
+    column: INTEGER
+    on_guard: INTEGER
+    side: INTEGER
+    known: INTEGER
+    noisy: TRUTH
+    rounding: REAL
+    band: REAL
+
+
+@njit(**KERNEL)
+def sought(model, method, run, transition, column, path, work):
+    """What the crossing of a guard that is a series is sought with."""
+    mode, on_guard, side = run.mode, run.on_guard[transition], run.side[transition]
+    kind = model.propagator[mode]
+    model.guard_gradient(transition, path.start, run.y, model.parameters, work.gradient)
+    rounding = rounding_band(model, run, transition, path.start, run.y, work)
+    band = rounding
+    if kind != EXACT:
+        band = error_band(method, run, work.gradient, model.dimension)
+    # A value that is small for a guard is less small for the root of the guard.
+    rounding, band = as_root(model, mode, rounding), as_root(model, mode, band)
+    # The root of a guard that is zero without speed begins to grow like its variable, too.
+    known = min(on_guard, 1) if kind in (DESINGULARISED, ROOTED) else on_guard
+    noisy = on_guard == BY_STEP and kind != EXACT
+    if noisy:
+        # Where terms of the field cancel, the first powers are rounding.
+        known = 0
+    elif on_guard == BY_STEP:
+        size = path.powers[path.degree + 2, column]
+        known = leading_power(path.powers, column, path.degree, path.length, known, size)
+    if on_guard == BY_STEP and has_just_fired(run, transition, on_guard):
+        side = 0
+    return Sought(transition, column, on_guard, side, known, noisy, rounding, band)
+
+
+@njit(**KERNEL)
+def crossing_by_leading(model, run, guard, path, size, power, work):
+    """``crossing_in_series`` by the leading powers of a guard, with a verdict, which may be ``UNKNOWN``.
+
+    ``size`` is the sum of the magnitudes of the powers that are not known, ``power`` that of the step's
+    length in the first of them.
+    """
+    series, order, h, side = path.powers, path.degree, path.length, guard.side
+    column, transition = guard.column, guard.transition
+    degree, rest = leading_powers(series, column, order, power, guard.known, size, work.polynomial, h)
+    leading_to_bernstein(work.polynomial, degree, work.stack)
+    verdict, start, end, row = judge_leading(
+        degree, rest, order * rest, side, guard.band, series[order + 1, column], work.stack
+    )
+    if verdict != CROSSES:
+        return verdict, NO_ROOT, True
+    if not crosses_towards(model.direction[transition], -side):
+        return UNKNOWN, NO_ROOT, True
+    if underflows_on_series(series, column, order):
+        return CROSSES, NO_ROOT, True
+    # What is far from a bound for the last terms is resolved.
+    seen = degree <= order - TAIL_OF_GUARD and not is_close(series, column, order, MARGIN * rest + UNDERFLOW)
+    resolved = seen or is_resolved_by_series(model, run, transition, column, path, guard.on_guard, work)
+    bracket = Bracket(start * h, end * h, work.stack[row, 2], work.stack[row, 2 + degree])
+    run.rehearsal[3, transition] = side
+    return CROSSES, root_between(path, column, guard.known, bracket, side) / h, resolved
+
+
+@njit(**KERNEL)
+def crossing_by_all(model, run, guard, path, work):
+    """``crossing_in_series`` by all powers of a guard."""
+    series, order, h, column = path.powers, path.degree, path.length, guard.column
+    transition, before, hidden = guard.transition, guard.side, 0.0
+    degree = powers_on_step(series, column, order, h, guard.known, work.polynomial)
+    to_bernstein(work.polynomial, degree)
+    if guard.noisy:
+        end = series[order + 1, column]
+        hidden = hidden_share(work.polynomial, degree, guard.rounding, guard.band, end, work.stack)
+    if stays(work.polynomial, degree, before, guard.band):
+        return NO_ROOT, True
+    direction = model.direction[transition]
+    theta, end, row, side = bracket_crossing(work.polynomial, degree, before, direction, work.stack)
+    if theta < end:
+        ends = work.stack[row, 2], work.stack[row, 2 + degree]
+        start, end = hidden + theta * (1.0 - hidden), hidden + end * (1.0 - hidden)
+        bracket = Bracket(start * h, end * h, *ends)
+        theta = root_between(path, column, guard.known, bracket, -side) / h
+    if theta != NO_ROOT or side != before:
+        keep_passage(run, transition, direction, work.polynomial, degree, before, hidden, work.stack)
+    if guard.noisy:
+        degree = powers_on_step(series, column, order, h, guard.known, work.polynomial)
+        to_bernstein(work.polynomial, degree)
+    note_touches(run, transition, degree, guard.known, hidden, theta, guard.band, work)
+    if underflows_on_series(series, column, order):
+        return NO_ROOT, True
+    resolved = is_resolved_by_series(model, run, transition, column, path, guard.on_guard, work)
+    keep_outcome(run, transition, theta, side)
+    return theta, resolved
+
+
+@njit(**KERNEL)
+def crossing_in_series(model, method, run, transition, column, path, work):
+    """Where a guard crosses that is a series itself, as a share of the step, and whether that is resolved."""
+    guard = sought(model, method, run, transition, column, path, work)
+    size = path.powers[path.degree + 2, column]
+    size, power = beyond_known_roots(path.powers, column, path.length, guard.known, size)
+    if guard.on_guard > 0:
+        if size <= guard.rounding:
+            return NO_ROOT, True
+        run.on_guard[transition] = 0
+    if not guard.noisy:
+        # The second cheap proof: the leading powers keep to their side, whatever the others do.
+        verdict, theta, resolved = crossing_by_leading(model, run, guard, path, size, power, work)
+        if verdict != UNKNOWN:
+            return theta, resolved
+    return crossing_by_all(model, run, guard, path, work)
+
+
+@njit(**KERNEL)
+def earliest_on_series(attempts, model, method, run, path, work):
     """Earliest crossing on a step over the guards of the mode, and its transition.
 
     Returns ``(theta, transition, proved, blurred)``, and brings sides up to date, as
@@ -297,116 +436,24 @@ def earliest_on_series(attempts, model, method, run, order, t, h, clock, work):
     series itself is a polynomial, up to the remainder of the series; what it is a sum of stands behind the
     series. For any other guard its own expression is bounded on the series of the state.
     """
-    mode, series = run.mode, work.series
-    kind = model.propagator[mode]
+    mode, series, order = run.mode, path.powers, path.degree
     earliest, fired, proved, blurred = NO_ROOT, NO_TRANSITION, 1.0, NO_TRANSITION
     forget_touches(run)
     first = model.first_outgoing[mode]
     for slot in range(first, model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         keep_side(run, transition)
-        on_guard, side = run.on_guard[transition], run.side[transition]
         if model.guard_in_series[transition] == 0:
-            later = time_at(series, order, clock, t, 1.0, h)
-            for i in range(model.dimension):
-                work.trial[i] = series[order + 1, i]
-            theta, share = attempts.crossing_beside_series(
-                model, method, run, transition, order, t, h, clock, work
-            )
-            side = run.rehearsal[3, transition]
-            run.rehearsal[3, transition] = 0
+            theta, share, resolved = crossing_beside(attempts, model, method, run, transition, path, work)
             proved = min(proved, share)
-            if underflows(model, transition, t, run.y, later, work.trial, work.scalar):
+        else:
+            column, side = model.dimension + slot - first, run.side[transition]
+            value, size = series[order + 1, column] * side, series[order + 2, column]
+            if run.on_guard[transition] == 0 and keeps_half(series[0, column] * side, value, size):
                 continue
-            if not is_resolved_by_series(model, run, transition, -1, order, t, h, clock, on_guard, work):
-                blurred = transition
-            if theta == NO_ROOT:
-                keep_change(run, transition, side)
-                continue
-            keep_crossing(run, transition, theta, side)
-            if theta < earliest:
-                earliest, fired = theta, transition
-            continue
-        column = model.dimension + slot - first
-        value, size = series[order + 1, column] * side, series[order + 2, column]
-        if on_guard == 0 and keeps_half(series[0, column] * side, value, size):
-            continue
-        model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
-        rounding = rounding_band(model, run, transition, t, run.y, work)
-        band = rounding
-        if kind != EXACT:
-            band = error_band(method, run, work.gradient, model.dimension)
-        # A value that is small for a guard is less small for the root of the guard.
-        rounding, band = as_root(model, mode, rounding), as_root(model, mode, band)
-        # The root of a guard that is zero without speed begins to grow like its variable, too.
-        known = min(on_guard, 1) if kind in (DESINGULARISED, ROOTED) else on_guard
-        noisy = on_guard == BY_STEP and kind != EXACT
-        if noisy:
-            # Where terms of the field cancel, the first powers are rounding.
-            known = 0
-        elif on_guard == BY_STEP:
-            known = leading_power(series, column, order, h, known, size)
-        size, power = beyond_known_roots(series, column, h, known, size)
-        if on_guard > 0:
-            if size <= rounding:
-                continue
-            run.on_guard[transition] = 0
-            if on_guard == BY_STEP and has_just_fired(run, transition, on_guard):
-                side = 0
-        verdict, start, end, row, degree, rest, hidden = UNKNOWN, 0.0, 1.0, 0, 0, 0.0, 0.0
-        if not noisy:
-            # The second cheap proof: the leading powers keep to their side, whatever the others do.
-            degree, rest = leading_powers(series, column, order, power, known, size, work.polynomial, h)
-            leading_to_bernstein(work.polynomial, degree, work.stack)
-            verdict, start, end, row = judge_leading(
-                degree, rest, order * rest, side, band, series[order + 1, column], work.stack
-            )
-        if verdict == CLEAR:
-            continue
-        if verdict == CROSSES and crosses_towards(model.direction[transition], -side):
-            if underflows_on_series(series, column, order):
-                continue
-            # What is far from a bound for the last terms is resolved.
-            seen = degree <= order - TAIL_OF_GUARD and not is_close(
-                series, column, order, MARGIN * rest + UNDERFLOW
-            )
-            if not seen and not is_resolved_by_series(
-                model, run, transition, column, order, t, h, clock, on_guard, work
-            ):
-                blurred = transition
-            ends = work.stack[row, 2], work.stack[row, 2 + degree]
-            theta = root_between(series, column, order, known, h, start * h, end * h, *ends, side) / h
-            run.rehearsal[3, transition] = side
-            if theta < earliest:
-                earliest, fired = theta, transition
-            continue
-        degree = powers_on_step(series, column, order, h, known, work.polynomial)
-        to_bernstein(work.polynomial, degree)
-        if noisy:
-            value = series[order + 1, column]
-            hidden = hidden_share(work.polynomial, degree, rounding, band, value, work.stack)
-        if stays(work.polynomial, degree, side, band):
-            continue
-        direction, before = model.direction[transition], side
-        theta, end, row, side = bracket_crossing(work.polynomial, degree, side, direction, work.stack)
-        if theta < end:
-            ends = work.stack[row, 2], work.stack[row, 2 + degree]
-            start, end = hidden + theta * (1.0 - hidden), hidden + end * (1.0 - hidden)
-            theta = root_between(series, column, order, known, h, start * h, end * h, *ends, -side) / h
-        if theta != NO_ROOT or side != before:
-            keep_passage(run, transition, direction, work.polynomial, degree, before, hidden, work.stack)
-        if noisy:
-            degree = powers_on_step(series, column, order, h, known, work.polynomial)
-            to_bernstein(work.polynomial, degree)
-        note_touches(run, transition, degree, known, hidden, theta, band, work)
-        if underflows_on_series(series, column, order):
-            continue
-        if not is_resolved_by_series(model, run, transition, column, order, t, h, clock, on_guard, work):
+            theta, resolved = crossing_in_series(model, method, run, transition, column, path, work)
+        if not resolved:
             blurred = transition
-        if theta == NO_ROOT:
-            keep_change(run, transition, side)
-            continue
-        keep_crossing(run, transition, theta, side)
         if theta < earliest:
             earliest, fired = theta, transition
     set_sides_before(model, run, earliest)

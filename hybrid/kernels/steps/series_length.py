@@ -1,6 +1,7 @@
 """How long the step of a series may be: its last terms are to be below the tolerances."""
 
 import math
+from typing import NamedTuple
 
 from numba import njit
 
@@ -18,6 +19,7 @@ from hybrid.kernels.arithmetic.lanes import (
 from hybrid.kernels.arithmetic.powers import binary_logarithms, power_of_two
 from hybrid.kernels.instructions.registers import whole_registers
 from hybrid.kernels.types.codes import NARROW
+from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH
 from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Series that can be trusted to the last digit are cut off below rounding.
@@ -49,10 +51,31 @@ MOST_BITS = 900.0
 FALL_OF_EXACT = 4.0
 
 
+class Columns(NamedTuple):
+    """The columns of a series by which its step is controlled.
+
+    The first ``n`` are the state. The tangent vectors, four in a group, begin at ``first``, and their
+    ``groups`` are ``stride`` columns apart.
+    """
+
+    n: INTEGER
+    first: INTEGER
+    stride: INTEGER
+    groups: INTEGER
+
+
+class Tolerance(NamedTuple):
+    """The tolerances of a series; one that is ``exact`` can be trusted to the last digit."""
+
+    rtol: REAL
+    atol: REAL
+    exact: TRUTH
+
+
 @njit(**INLINE)
-def weigh_state(series, n, rtol, atol, exact, weights):
+def weigh_state(series, n, tolerance, weights):
     """One over the tolerance of each component of the state into ``weights``; all other weights are zero."""
-    largest = 0.0
+    largest, (rtol, atol, exact) = 0.0, tolerance
     for i in range(n if exact else 0):
         largest = max(largest, abs(series[0, i]))
     if exact and largest == 0.0:
@@ -67,9 +90,9 @@ def weigh_state(series, n, rtol, atol, exact, weights):
 
 
 @njit(**INLINE)
-def weigh_tangents(series, n, first, rtol, exact, weights):
+def weigh_tangents(series, n, first, tolerance, weights):
     """One over the tolerance of every component of four tangent vectors, each measured against itself."""
-    square = four_times(0.0)
+    square, (rtol, _, exact) = four_times(0.0), tolerance
     for i in range(n):
         component = load(series, 0, first + NARROW * i)
         square = component * component + square
@@ -82,10 +105,10 @@ def weigh_tangents(series, n, first, rtol, exact, weights):
 
 
 @njit(**INLINE)
-def largest_term(series, n, first, stride, groups, order, weights):
+def largest_term(series, columns, order, weights):
     """The largest terms of an order in tolerances, four at a time."""
     # A nan is skipped here; it shows when the series is summed.
-    worst = four_times(0.0)
+    worst, (n, first, stride, groups) = four_times(0.0), columns
     for i in range(0, n, NARROW):
         worst = larger(load(weights, 0, i) * magnitude(load(series, order, i)), worst)
     for g in range(groups):
@@ -95,16 +118,16 @@ def largest_term(series, n, first, stride, groups, order, weights):
 
 
 @njit(**INLINE)
-def logarithms_of_terms(series, n, first, stride, groups, order, least, weights):
+def logarithms_of_terms(series, columns, order, least, weights):
     """Logarithms of the largest terms of ``order`` and the three orders before, of those above ``least``."""
-    a = largest_term(series, n, first, stride, groups, order, weights)
+    a = largest_term(series, columns, order, weights)
     b, c, d = four_times(0.0), four_times(0.0), four_times(0.0)
     if order - 1 > least:
-        b = largest_term(series, n, first, stride, groups, order - 1, weights)
+        b = largest_term(series, columns, order - 1, weights)
     if order - 2 > least:
-        c = largest_term(series, n, first, stride, groups, order - 2, weights)
+        c = largest_term(series, columns, order - 2, weights)
     if order - 3 > least:
-        d = largest_term(series, n, first, stride, groups, order - 3, weights)
+        d = largest_term(series, columns, order - 3, weights)
     return binary_logarithms(largest_of_each(a, b, c, d))
 
 
@@ -114,8 +137,14 @@ def shares_of_orders(logarithms, first, order, fall):
     return (logarithms - fall * (order - first + places())) / larger(first - places(), four_times(1.0))
 
 
+@njit(**INLINE)
+def fall_per_order(tolerance, order):
+    """How many bits a term of a series is to be larger than the next."""
+    return FALL_OF_EXACT if tolerance.exact else -math.log2(tolerance.rtol) / order
+
+
 @njit(**KERNEL)
-def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, weights):
+def longest_step(series, columns, order, tolerance, weights):
     """Longest step at which the last terms are below tolerance, as after Jorba and Zou 2005.
 
     The tolerances are those of the Runge-Kutta methods, each tangent vector a block by itself. The last
@@ -127,36 +156,37 @@ def longest_step(series, n, first, stride, groups, order, rtol, atol, exact, wei
     Returned with it are the logarithm of one over the step that the terms suggest, and by how much the newer
     of them are larger than the older ones, for ``is_regular``.
     """
-    weigh_state(series, n, rtol, atol, exact, weights)
-    for g in range(groups):
-        weigh_tangents(series, n, first + g * stride, rtol, exact, weights)
-    fall = FALL_OF_EXACT if exact else -math.log2(rtol) / order
+    weigh_state(series, columns.n, tolerance, weights)
+    for g in range(columns.groups):
+        weigh_tangents(series, columns.n, columns.first + g * columns.stride, tolerance, weights)
+    exact, fall = tolerance.exact, fall_per_order(tolerance, order)
     tail = order - (TAIL_OF_EXACT if exact else TAIL)
-    newer = logarithms_of_terms(series, n, first, stride, groups, order, tail, weights)
+    newer = logarithms_of_terms(series, columns, order, tail, weights)
     older = newer
     last = largest(shares_of_orders(newer, order, order, fall))
     for o in range(order - NARROW, tail, -NARROW):
-        older = logarithms_of_terms(series, n, first, stride, groups, o, tail, weights)
+        older = logarithms_of_terms(series, columns, o, tail, weights)
         last = max(last, largest(shares_of_orders(older, o, order, fall)))
     growth = largest(newer) - largest(older)
     return (1.0 if exact else SAFETY) * power_of_two(-last), last, growth
 
 
 @njit(**KERNEL)
-def is_regular(series, n, order, rtol, exact, weights, last, growth):
+def is_regular(series, n, order, tolerance, last, growth, weights):
     """Whether the terms of the state before the last ones suggest about the same step.
 
-    The last two arguments are results of ``longest_step``, which has left the weights. A series may have
+    ``last`` and ``growth`` are results of ``longest_step``, which has left the weights. A series may have
     gaps, as that of ``t - x**9`` near zero: then small terms say nothing of those that follow. Nor do terms
     that grow over the step.
     """
+    exact = tolerance.exact
     tail = order - (TAIL_OF_EXACT if exact else TAIL)
     if tail <= 0:
         return last > -1000.0
-    fall = FALL_OF_EXACT if exact else -math.log2(rtol) / order
+    fall, state = fall_per_order(tolerance, order), Columns(n, 0, 0, 0)
     before, least = -math.inf, max(tail - BEFORE_TAIL, 0)
     for o in range(tail, least, -NARROW):
-        earlier = logarithms_of_terms(series, n, 0, 0, 0, o, least, weights)
+        earlier = logarithms_of_terms(series, state, o, least, weights)
         before = max(before, largest(shares_of_orders(earlier, o, order, fall)))
     if not LEAST_RISE <= before - last <= (MOST_RISE_OF_EXACT if exact else MOST_RISE):
         return False
@@ -165,19 +195,19 @@ def is_regular(series, n, order, rtol, exact, weights, last, growth):
 
 
 @njit(**KERNEL)
-def within_floats(series, n, first, stride, groups, order, rtol, atol, exact, weights):
+def within_floats(series, columns, order, tolerance, weights):
     """The order up to which the terms of a series are normal floats, with what ``longest_step`` says of it.
 
     Units of time far from the pace of the solution make the later terms overflow or vanish. Terms that vanish
     in a low order, too, are those of a polynomial, and the order stays as it is.
     """
-    least, highest = (TAIL_OF_EXACT if exact else TAIL) + 1, order
-    h, last, growth = longest_step(series, n, first, stride, groups, least, rtol, atol, exact, weights)
+    least, highest = (TAIL_OF_EXACT if tolerance.exact else TAIL) + 1, order
+    h, last, growth = longest_step(series, columns, least, tolerance, weights)
     if not least * abs(math.log2(h)) <= MOST_BITS:
-        h, last, growth = longest_step(series, n, first, stride, groups, highest, rtol, atol, exact, weights)
+        h, last, growth = longest_step(series, columns, highest, tolerance, weights)
         return highest, h, last, growth
     while order > least:
-        h, last, growth = longest_step(series, n, first, stride, groups, order, rtol, atol, exact, weights)
+        h, last, growth = longest_step(series, columns, order, tolerance, weights)
         most = int(MOST_BITS / abs(math.log2(h)))
         if order <= most:
             break

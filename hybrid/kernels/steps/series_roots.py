@@ -1,11 +1,13 @@
 """Roots of a guard that is a series, and the place on a step where its clock shows a time."""
 
 import math
+from typing import NamedTuple
 
 from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import AT_END, SETTLED
 from hybrid.kernels.events.path import value_at
+from hybrid.kernels.types.kinds import REAL
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -13,6 +15,18 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 UNSEEN = 64.0
 # Most steps of Newton's method from a root without to one with what is zero at the start up to rounding.
 MOST_CORRECTIONS = 60
+
+
+class Bracket(NamedTuple):
+    """Two places of a step with one root between them, and the values there, up to a positive factor.
+
+    Where another root is at a place, its value is zero, or has any sign.
+    """
+
+    low: REAL
+    high: REAL
+    left: REAL
+    right: REAL
 
 
 @njit(**INLINE)
@@ -69,17 +83,16 @@ def time_of(series, clock, order, h, span):
 
 
 @njit(**KERNEL)
-def root_between(series, column, order, known_roots, h, low, high, left, right, side):
-    """The one root of a series in an open interval of the step ``h``; the sign before it is ``side``.
+def root_between(path, column, known_roots, bracket, side):
+    """The one root of a series in an open interval of the step; the sign before it is ``side``.
 
-    ``left`` and ``right`` are the values at its ends, up to a positive factor. Another root may be at an end:
-    then they are zero, or have any sign. The series is divided by its variable for each known root at 0; in
-    the end it is taken as it is, which at 0 is zero up to rounding only; but not to a root at 0, where the
-    step begins.
+    Another root may be at an end of the interval. The series is divided by its variable for each known root
+    at 0; in the end it is taken as it is, which at 0 is zero up to rounding only; but not to a root at 0,
+    where the step begins.
     """
-    s = simple_root_of(series, column, order, known_roots, h, low, high, left, right, side)
+    s, h = simple_root_of(path, column, known_roots, bracket, side), path.length
     for _ in range(MOST_CORRECTIONS if known_roots > 0 else 0):
-        value, slope, _ = expanded_at(series, column, 0, order, s)
+        value, slope, _ = expanded_at(path.powers, column, 0, path.degree, s)
         shift = -value / slope if slope != 0.0 else 0.0
         if not abs(shift) <= 1e-6 * h or not 0.5 * s <= s + shift <= h:
             break
@@ -90,18 +103,19 @@ def root_between(series, column, order, known_roots, h, low, high, left, right, 
 
 
 @njit(**INLINE)
-def simple_root_of(series, column, order, known_roots, h, low, high, left, right, side):
+def simple_root_of(path, column, known_roots, bracket, side):
     """``root_between`` of the series divided by what is known, by Halley's method and Newton's in a bracket.
 
     The error after a step of Halley's is about the cube of the step, over the square of the length on which
     the guard bends: where that is rounding, it need not be looked at.
     """
+    low, high, left, right = bracket
     s, last = low + (high - low) * (left / (left - right)), high - low
     first, final = low + AT_END * last, high - AT_END * last
     if not low < s < high:
         s = 0.5 * (low + high)
     for _ in range(100):
-        value, slope, bend = expanded_at(series, column, known_roots, order, s)
+        value, slope, bend = expanded_at(path.powers, column, known_roots, path.degree, s)
         turned = slope * side > 0.0
         if turned:
             # Another root, at an end of the bracket up to rounding, attracts from here.
@@ -125,7 +139,7 @@ def simple_root_of(series, column, order, known_roots, h, low, high, left, right
         if change <= EPSILON * s or (last < SETTLED * s and change > 0.25 * last):
             return s
         if low < closer < high:
-            if UNSEEN * ((abs(curve) + 1.0 / h) * change) ** 2 * change <= EPSILON * s:
+            if UNSEEN * ((abs(curve) + 1.0 / path.length) * change) ** 2 * change <= EPSILON * s:
                 return closer
         else:
             # A bisection says nothing of how the steps of the method shrink.

@@ -7,8 +7,9 @@ from numba import njit
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.slopes import change_of_rate, whole_jacobian
 from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL, VECTOR, Pair
-from hybrid.kernels.types.layout import EPSILON, Method, Model, Task, Work
+from hybrid.kernels.types.layout import EPSILON, Method, Model, Path, Task, Work
 from hybrid.kernels.types.options import INLINE, KERNEL, exported
+from hybrid.kernels.types.task import task_of
 
 # At the start of a run, a state below this many tolerances counts as this large.
 MANY_TOLERANCES = 1e4
@@ -153,6 +154,12 @@ def interpolant_path(method, h, y, dimension, work):
             work.path[k, i] = h * total
 
 
+@njit(**INLINE)
+def path_of_step(method, t, h, work):
+    """The path that ``interpolant_path`` writes, for a step from ``t``."""
+    return Path(work.path, method.powers.shape[0] - 1, -1, t, h, 1.0, False)
+
+
 @njit(**KERNEL)
 def starting_step(model, method, mode, t, y, tangents, remaining, work):
     """A first step length from the sizes of ``y``, ``y'`` and ``y''`` (Hairer, Norsett, Wanner 1993, II.4).
@@ -188,21 +195,23 @@ def starting_step(model, method, mode, t, y, tangents, remaining, work):
 
 
 @njit(**INLINE)
-def attempt(parts, model, method, mode, t, h, y, tangents, work):
-    """Try a step of length ``h`` from ``y``; its result is ``work.new``. Returns the error ratio.
+def attempt(task, h):
+    """Try a step of length ``h`` from the state; its result is ``work.new``. Returns the error ratio.
 
-    ``work.stages[0]`` holds the rates at ``(t, y)``; the rates at the new point are left in
+    ``work.stages[0]`` holds the rates at the start; the rates at the new point are left in
     ``work.stages[s]``. A ratio above 1, or nan, rejects the step.
     """
+    attempts, model, method, run, _, work = task_of(task)
+    mode, t, tangents = run.mode, run.phase, task.tangents
     if method.implicit != 0:
-        return parts.attempt_implicit(model, method, mode, t, h, y, tangents, work)
-    return attempt_explicit(model, method, mode, t, h, y, tangents, work)
+        return attempts.attempt_implicit(model, method, mode, t, h, run.y, tangents, work)
+    return attempt_explicit(model, method, mode, t, h, run.y, tangents, work)
 
 
 @njit(**KERNEL)
-def attempt_again(parts, model, method, mode, t, h, y, tangents, work):
+def attempt_again(task, h):
     """``attempt`` as a function that is compiled once, for steps that are repeated."""
-    return attempt(parts, model, method, mode, t, h, y, tangents, work)
+    return attempt(task, h)
 
 
 @exported(Pair(REAL), Task, REAL)

@@ -88,3 +88,5 @@ REGISTERS = 6
 # What a forcing stands for: a part in time, terms in the state that may be pulses, or the arguments of the
 # exponentials in these.
 IN_TIME, TERMS, ARGUMENTS = range(3)
+# No limit to a count.
+UNLIMITED = 9223372036854775807

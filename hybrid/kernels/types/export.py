@@ -12,7 +12,7 @@ from llvmlite import ir
 from numba.core import types
 from numba.core.compiler_lock import global_compiler_lock
 
-from hybrid.kernels.types.kinds import BY_WORDS, Pair, width_of
+from hybrid.kernels.types.kinds import BY_WORDS, Pair, is_bundle, width_of
 from hybrid.kernels.types.numba_types import array_in, numba_type, signature_of, word_in
 from hybrid.kernels.types.part_compiler import WholeLibrary
 
@@ -60,7 +60,7 @@ def object_code(exports):
         library.add_linking_library(compiled.library)
         module = context.create_module(name)
         function = _write_typed(context, module, name, compiled.fndesc)
-        if not isinstance(result, Pair):
+        if not (isinstance(result, Pair) or any(map(is_bundle, arguments))):
             _write_by_words(context, module, function, result, arguments)
         library.add_ir_module(module)
     library.finalize()

@@ -43,12 +43,17 @@ INDICES, INDEX_MATRIX = (Array("int64", ndim) for ndim in (1, 2))
 # Behind the name of a kernel: its function that takes a table of words (``export``).
 BY_WORDS = "_by_words"
 # Kinds without a name of their own, as text.
-NOTHING, TWO_NUMBERS, ADDRESS = "nothing", "two numbers", "address"
+NOTHING, TWO_NUMBERS, SEVERAL, ADDRESS = "nothing", "two numbers", "several values", "address"
 
 
 def function(result, *arguments):
     """The kind of a function."""
     return Function(result, arguments)
+
+
+def is_bundle(kind):
+    """Whether a kind is a NamedTuple of values, annotated with kinds: only kernels pass one to each other."""
+    return isinstance(kind, type) and issubclass(kind, tuple)
 
 
 def text_of(kind):
@@ -59,6 +64,8 @@ def text_of(kind):
         return kind.dtype
     if isinstance(kind, Array):
         return f"{kind.dtype}[{kind.ndim}]"
+    if is_bundle(kind):
+        return SEVERAL
     return TWO_NUMBERS if isinstance(kind, Pair) else ADDRESS
 
 

@@ -4,6 +4,8 @@ A trajectory is one flat vector ``y`` of ``n (1 + k)`` entries: the state first,
 one after the other, so that each of them is contiguous. ``n`` is the dimension, ``k`` the number of tangents.
 """
 
+from typing import NamedTuple
+
 from hybrid.kernels.types.kinds import (
     CUBE,
     INDEX_MATRIX,
@@ -40,8 +42,25 @@ class Programs(Structure):
     parameters: VECTOR
 
 
+class Path(NamedTuple):
+    """The state and the time along a step, for values of the step's variable in ``[0, length]``.
+
+    ``powers (>= degree + 1, columns)`` are the coefficients of the state's components in powers of the
+    variable. Time is ``start`` plus ``pace`` times the variable if ``clock`` is negative; otherwise it is
+    ``start`` plus the column ``clock``. An ``exact`` path has no error of a method.
+    """
+
+    powers: MATRIX
+    degree: INTEGER
+    clock: INTEGER
+    start: REAL
+    pace: REAL
+    length: REAL
+    exact: TRUTH
+
+
 # ``bounds.bound_guard`` and ``bounds.spread_by_rounding``.
-BOUND = function(INTEGER, Programs, INTEGER, MATRIX, INTEGER, INTEGER, REAL, REAL, REAL, REAL, MATRIX)
+BOUND = function(INTEGER, Programs, INTEGER, Path, REAL, REAL, MATRIX)
 SPREAD = function(REAL, Programs, INTEGER, REAL, REAL, VECTOR, VECTOR, REAL, MATRIX)
 
 
@@ -392,10 +411,8 @@ class Attempts(Structure):
     attempt_implicit: function(REAL, Model, Method, INTEGER, REAL, REAL, VECTOR, INTEGER, Work)
     explained_step: function(REAL, Model, Method, Run, REAL, Work)
     explained_attempt: function(REAL, Model, Method, Run, REAL, Work)
-    explained_series: function(REAL, Model, Method, Run, INTEGER, INTEGER, INTEGER, REAL, Work)
-    crossing_beside_series: function(
-        Pair(REAL), Model, Method, Run, INTEGER, INTEGER, REAL, REAL, INTEGER, Work
-    )
+    explained_series: function(REAL, Model, Method, Run, INTEGER, Path, Work)
+    crossing_beside_series: function(Pair(REAL), Model, Method, Run, INTEGER, Path, Work)
 
 
 class Task(Structure):

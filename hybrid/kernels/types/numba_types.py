@@ -19,7 +19,7 @@ from numba.extending import (
 )
 from numba.np.arrayobj import populate_array
 
-from hybrid.kernels.types.kinds import TRUTH, Array, Function, Number, Pair
+from hybrid.kernels.types.kinds import TRUTH, Array, Function, Number, Pair, is_bundle
 from hybrid.kernels.types.lowering import array_of
 from hybrid.kernels.types.structure import Structure
 
@@ -48,6 +48,8 @@ def numba_type(kind):
         return types.Array(getattr(types, kind.dtype), kind.ndim, "C")
     if isinstance(kind, Pair):
         return types.UniTuple(numba_type(kind.number), 2)
+    if is_bundle(kind):
+        return types.BaseTuple.from_types([numba_type(each) for each in kind.__annotations__.values()], kind)
     if isinstance(kind, Function):
         return types.ExternalFunctionPointer(signature_of(kind.result, *kind.arguments), None)
     return StructureType(kind)

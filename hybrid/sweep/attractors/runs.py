@@ -15,7 +15,7 @@ from hybrid.errors import ArgumentError
 from hybrid.kernels.types import attractors as kernel_types
 from hybrid.kernels.types import codes
 from hybrid.simulation.interrupt import CTRL_C, Bursts
-from hybrid.simulation.memory import fresh_run, fresh_work
+from hybrid.simulation.memory import fresh_run, fresh_work, starts_of
 from hybrid.simulation.plan import plan_of
 from hybrid.simulation.trajectory import Trajectory
 from hybrid.status import StatusCode
@@ -75,29 +75,20 @@ class Runs:
         run, phase0 = fresh_run(plan.run_layout, self.model, origins[0], None, self.setup.t0)
         work = fresh_work(plan.work_layout, plan.method)
         trajectory = Trajectory(self.compiled, plan, self.model, run, work, 0, solver.max_steps, phase0)
-        memory = (plan.run_layout.words(run), plan.work_layout.words(work))
-        words = [each for held in memory for each in (held, held.copy())]
+        limits = {"max_steps": solver.max_steps, "max_jumps": codes.UNLIMITED}
+        starts = starts_of(plan, run, work, origins, named=self.named, found=found, **limits)
         task = trajectory.task(trajectory.no_record())
         section, progress = self.section(phase0, most), self.progress(trajectory)
         kernel, advance = load_kernels("hybrid.kernels.events.settle").settle, load_kernels().advance
-        verdicts = np.zeros(len(self.setup.marked.transitions), dtype=np.int64)
-        reached, bursts = np.zeros(1, dtype=np.int64), Bursts([trajectory])
-        first, resumed = 0, 0
-        while True:
+        bursts = Bursts([trajectory])
+        while starts.reached < len(origins):
             bursts.most()
-            code = kernel(
-                *(advance, self.parts, task, *words, origins, self.named, known, section, progress),
-                *(first, resumed, solver.max_steps, bursts.steps, found, verdicts, reached),
-            )
-            first, resumed = int(reached[0]), int(code == codes.GO_ON)
-            if code == codes.DONE:
-                return
+            code = kernel(advance, self.parts, task, starts, known, section, progress, bursts.steps)
+            first = starts.reached
             if code == codes.REFUSED:
                 self._one(origins[first : first + 1], known, most, found[first : first + 1])
-                first += 1
-                if first == len(origins):
-                    return
-            if resumed and bursts.judged(codes.MAX_STEPS) == StatusCode.INTERRUPTED:
+                starts.reached = first + 1
+            if starts.resumed and bursts.judged(codes.MAX_STEPS) == StatusCode.INTERRUPTED:
                 found[first:, CODE], found[first:, OWNER] = StatusCode.NOT_RUN, NONE
                 return
 

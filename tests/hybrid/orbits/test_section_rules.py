@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.types import codes
+from hybrid.kernels.types.codes import UNLIMITED
 from hybrid.orbits import sections
-from hybrid.simulation.trajectory import UNLIMITED
 from hybrid.status import StatusCode
 
 STEPS = 10

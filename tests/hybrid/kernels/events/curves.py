@@ -8,11 +8,11 @@ import pytest
 
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT
 from hybrid.kernels.types.codes import HIGH, HIGH_MIDDLE, LEAST_SLOPE, LOW, LOW_MIDDLE, MOST_SLOPE
-from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.layout import EPSILON, Path
 
 # One component, which is the place itself: time is 10 plus half of the place.
-PATH, ORDER, CLOCK, START, PACE = np.array([[0.0], [1.0]]), 1, -1, 10.0, 0.5
-ALONG = (PATH, ORDER, CLOCK, START, PACE)
+START, PACE = 10.0, 0.5
+ALONG = Path(np.array([[0.0], [1.0]]), 1, -1, START, PACE, 1.0, True)
 TRANSITION = 1
 # Lengths of steps.
 UNITS = [1.0, 2.0**-20, 2.0**20]
@@ -92,8 +92,8 @@ def polynomial(*roots, factor=1.0, **others):
 def scene(curve, *, direction=0, side=0, on_guard=0, scale=1.0, fired=-1, since_entry=0.0, tolerance=0.0):
     """Model, method, run and memory."""
 
-    def bound(programs, transition, path, order, clock, start, pace, middle, radius, registers):
-        assert (transition, path is PATH, order, clock, start, pace) == (TRANSITION, True, *ALONG[1:])
+    def bound(programs, transition, path, middle, radius, registers):
+        assert (transition, path[:5]) == (TRANSITION, ALONG[:5])
         curve.asked.append((middle, radius))
         assert radius >= 0.0
         registers[2, [LOW, HIGH, LEAST_SLOPE, MOST_SLOPE, LOW_MIDDLE, HIGH_MIDDLE]] = curve.ranges(

@@ -17,7 +17,7 @@ from hybrid.kernels.types.codes import (
     MOST_SLOPE,
     REGISTERS,
 )
-from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.layout import EPSILON, Path
 from tests.hybrid.kernels.plain import plain
 
 kernels = plain(bounds)
@@ -42,7 +42,8 @@ def bounded(rows, numbers=(), parameters=(), *, path=LINES, middle=0.0, radius=0
     """Range, slopes and value in the middle."""
     registers = np.full((len(rows), REGISTERS), np.nan)
     programs = program(rows, numbers, parameters)
-    last = kernels.bound_guard(programs, 1, path, len(path) - 1, clock, 3.0, pace, middle, radius, registers)
+    along = Path(path, len(path) - 1, clock, 3.0, pace, math.nan, True)
+    last = kernels.bound_guard(programs, 1, along, middle, radius, registers)
     assert last == len(rows) - 1
     row = registers[last]
     return tuple(

@@ -20,7 +20,7 @@ from hybrid.kernels.types.codes import (
     MOST_SLOPE,
     REGISTERS,
 )
-from hybrid.kernels.types.layout import Programs
+from hybrid.kernels.types.layout import Path, Programs
 
 _bound, _spread = bounds.bound_guard, bounds.spread_by_rounding
 
@@ -46,7 +46,8 @@ TRUTHS = {
 
 @njit
 def _row(programs, path, clock, middle, radius, registers):
-    return _bound(programs, 0, path, path.shape[0] - 1, clock, START, PACE, middle, radius, registers)
+    along = Path(path, path.shape[0] - 1, clock, START, PACE, middle + radius, True)
+    return _bound(programs, 0, along, middle, radius, registers)
 
 
 @njit

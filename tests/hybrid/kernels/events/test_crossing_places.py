@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hybrid.kernels.events import crossings
+from hybrid.kernels.events import crossings, pieces
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP
 from hybrid.kernels.events.sampled import NOWHERE
 from hybrid.kernels.types.codes import HIGH, HIGH_MIDDLE, LEAST_SLOPE, LOW, LOW_MIDDLE, MOST_SLOPE
@@ -21,31 +21,18 @@ from tests.hybrid.kernels.events.curves import (
 )
 from tests.hybrid.kernels.plain import plain
 
-kernels = plain(crossings)
+kernels = plain(pieces)
+
+
+def known(side=1, *, on_guard=0, sure=0.0, base=0.0, tilt=0.0):
+    return pieces.Known(side, on_guard, sure, base, tilt)
 
 
 class TestRows:
-    def test_a_known_part_is_taken_from_all_bounds(self):
-        for tilt, low, high in ((3.0, -1.0 - 13.0, 4.0 - 7.0), (-3.0, -1.0 + 5.0, 4.0 + 11.0)):
-            row = np.zeros(6)
-            row[[LOW, HIGH, LOW_MIDDLE, HIGH_MIDDLE, LEAST_SLOPE, MOST_SLOPE]] = (
-                -1.0,
-                4.0,
-                1.0,
-                2.0,
-                -6.0,
-                8.0,
-            )
-            kernels._shifted(row, 1.0, tilt, 2.0, 4.0)
-            middle = 1.0 + 3.0 * tilt
-            assert row[[LOW, HIGH]].tolist() == [low, high]
-            assert row[[LOW_MIDDLE, HIGH_MIDDLE]].tolist() == [1.0 - middle, 2.0 - middle]
-            assert row[[LEAST_SLOPE, MOST_SLOPE]].tolist() == [-6.0 - tilt, 8.0 - tilt]
-
     @pytest.mark.parametrize(("base", "tilt"), [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.25, -4.0)])
     def test_the_row_of_a_place(self, base, tilt):
         model, _, _, work = scene(polynomial(1.0, 3.0, noise=0.125))
-        assert kernels._row_at(model, TRANSITION, *ALONG, 2.0, base, tilt, work) == 2
+        assert kernels.row_at(model, TRANSITION, ALONG, 2.0, known(base=base, tilt=tilt), work) == 2
         value = -1.0 - base - 2.0 * tilt
         row = work.registers[2]
         assert row[[LOW, HIGH]].tolist() == [value - 0.125, value + 0.125]
@@ -70,7 +57,7 @@ class TestRows:
         model, _, _, work = scene(Curve(lambda place: 6.0 * place, None))
         row = np.zeros(6)
         row[[LEAST_SLOPE, MOST_SLOPE]], row[[LOW_MIDDLE, HIGH_MIDDLE]] = slopes, middle
-        assert kernels._value_at(model, TRANSITION, *ALONG, 2.0, row, 5.0, 3.0, work) == value
+        assert kernels._value_at(model, TRANSITION, ALONG, 2.0, row, known(base=5.0, tilt=3.0), work) == value
 
     def test_the_flattest_slope(self):
         for least, most, flattest in ((2.0, 5.0, 2.0), (-5.0, -2.0, -2.0), (2.0, math.inf, 2.0)):
@@ -85,24 +72,24 @@ class TestRows:
         model, _, _, work = scene(Curve(lambda place: place - 2.0, lambda place: 1.0, noise=0.5))
 
         def sign(place, base=0.0, tilt=0.0):
-            return kernels.certain_sign(model, TRANSITION, *ALONG, place, base, tilt, work)
+            return kernels.certain_sign(model, TRANSITION, ALONG, place, known(base=base, tilt=tilt), work)
 
         assert [sign(place) for place in (1.0, 1.5, 2.0, 2.5, 3.0)] == [-1, 0, 0, 0, 1]
         assert [sign(place, 1.0) for place in (2.0, 2.5, 3.0, 3.5, 4.0)] == [-1, 0, 0, 0, 1]
         assert [sign(place, -2.0, 2.0) for place in (-1.0, -0.5, 0.0, 0.5, 1.0)] == [1, 0, 0, 0, -1]
-        assert kernels._distance_at(model, TRANSITION, *ALONG, 5.0, 1, work) == 2.5
-        assert kernels._distance_at(model, TRANSITION, *ALONG, 5.0, -1, work) == -3.5
-        assert kernels._distance_at(model, TRANSITION, *ALONG, -1.0, -1, work) == 2.5
+        assert kernels.distance_at(model, TRANSITION, ALONG, 5.0, 1, work) == 2.5
+        assert kernels.distance_at(model, TRANSITION, ALONG, 5.0, -1, work) == -3.5
+        assert kernels.distance_at(model, TRANSITION, ALONG, -1.0, -1, work) == 2.5
 
     def test_guards_without_a_value(self):
         ends = scene(Curve(lambda place: place, lambda place: 1.0, domain=(1.0, 2.0)))
         for place, has in ((0.5, False), (1.0, True), (1.5, True), (2.5, False)):
-            assert kernels._has_value(ends[0], TRANSITION, *ALONG, place, ends[3]) == has
+            assert kernels._has_value(ends[0], TRANSITION, ALONG, place, ends[3]) == has
         for low, high in ((-math.inf, 3.0), (3.0, math.inf)):
             half = Curve(None, None)
             half.ranges = lambda *piece, low=low, high=high: (low, high, 0.0, 0.0, 0.0, 0.0)
             model, *_, work = scene(half)
-            assert kernels._has_value(model, TRANSITION, *ALONG, 0.0, work)
+            assert kernels._has_value(model, TRANSITION, ALONG, 0.0, work)
 
     def test_a_guard_that_rests_at_zero(self):
         for value, least, most, rests in (
@@ -124,16 +111,18 @@ class TestRows:
             (1.0, -1, False),
             (3.0, -1, True),
         ):
-            found = kernels._still_hidden(model, TRANSITION, *ALONG, place, side, 3.0, 5.0, work)
-            assert found == ((3.0, 5.0) if hides else (0.0, 0.0))
+            found = kernels.known_at(
+                model, TRANSITION, ALONG, place, side, known(on_guard=BY_STEP, base=3.0, tilt=5.0), work
+            )
+            parts = (3.0, 5.0) if hides else (0.0, 0.0)
+            assert found == (side, BY_STEP, place, *parts)
 
 
 class TestRootInBracket:
     def root(self, curve, low, high, side, *, on_guard=0, base=0.0, tilt=0.0):
         model, _, _, work = scene(curve)
-        place = kernels.root_in_bracket(
-            model, TRANSITION, *ALONG, low, high, side, on_guard, base, tilt, work
-        )
+        before = known(side, on_guard=on_guard, sure=low, base=base, tilt=tilt)
+        place = kernels.place_of_change(model, TRANSITION, ALONG, low, high, before, work)
         assert all(low <= asked <= high and radius == 0.0 for asked, radius in curve.asked)
         assert len(curve.asked) <= 110
         return place
@@ -226,7 +215,9 @@ class TestRootInBracket:
 class TestTurnBetween:
     def turn(self, curve, low, high, side, *, base=0.0, tilt=0.0):
         model, _, _, work = scene(curve)
-        return kernels._turn_between(model, TRANSITION, *ALONG, low, high, side, base, tilt, work)
+        return kernels._turn_between(
+            model, TRANSITION, ALONG, low, high, known(side, base=base, tilt=tilt), work
+        )
 
     @pytest.mark.parametrize("way", [1, -1])
     @pytest.mark.parametrize("unit", UNITS)
@@ -266,8 +257,12 @@ def test_how_far_tolerances_move_a_guard_at_a_place():
     """Its slope by the place times the tolerance of the place; times do not count."""
     model, method, run, work = scene(polynomial(1.0, 3.0), scale=8.0)
     method.atol, method.rtol = 0.5, 0.25
-    found = kernels._tolerated(model, method, run, TRANSITION, *ALONG, 4.0, work)
-    assert found == 4.0 * (0.5 + 0.25 * 8.0)
+    work.intervals[0] = 3.995, 4.005
+    path = ALONG._replace(length=8.0, exact=False)
+    for side, tolerated in ((1, 0.0), (-1, 4.0 * (0.5 + 0.25 * 8.0))):
+        piece = kernels.piece_of(model, TRANSITION, path, 0, known(side), work)._replace(turns=side < 0)
+        assert plain(crossings)._tolerated(model, method, run, TRANSITION, path, piece, work) == tolerated
+        assert plain(crossings)._tolerated(model, method, run, TRANSITION, ALONG, piece, work) == 0.0
 
 
 @pytest.mark.parametrize("way", [1, -1])
@@ -290,4 +285,7 @@ def test_a_guard_that_a_jump_has_left_beyond_zero(way, value, slope, on_guard, r
         tilts=0.1,
     )
     model, _, run, work = scene(curve)
-    assert kernels._returns(model, run, TRANSITION, *ALONG, way, on_guard, work) == returns
+    assert (
+        plain(crossings)._returns(model, run, TRANSITION, ALONG, known(way, on_guard=on_guard), work)
+        == returns
+    )

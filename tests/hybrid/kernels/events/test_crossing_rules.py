@@ -7,7 +7,7 @@ import pytest
 
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT
 from hybrid.kernels.events import crossings
-from hybrid.kernels.events.crossings import MOST_PIECES
+from hybrid.kernels.events.crossings import MOST_PIECES, Begin
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING
 from hybrid.kernels.events.sampled import NOWHERE
 from hybrid.kernels.types.layout import EPSILON
@@ -33,9 +33,8 @@ class TestFirstChange:
         model, method, run, work = scene(curve, **others)
         on_guard = others.get("on_guard", 0)
         with np.errstate(invalid="ignore"):
-            found = kernels.first_change(
-                model, method, run, TRANSITION, *ALONG, length, side, on_guard, hidden, exact, work
-            )
+            path, begin = ALONG._replace(length=length, exact=exact), Begin(side, on_guard, hidden)
+            found = kernels.first_change(model, method, run, TRANSITION, path, begin, work)
         assert all(
             -EPSILON * length <= middle - radius and middle + radius <= length * (1.0 + EPSILON)
             for middle, radius in curve.asked
@@ -374,9 +373,10 @@ class TestCrossingOnPath:
             model.programs.first[:] = 0
         model.field = None
         tested = plain(crossings, hidden_until=hidden_until).crossing_on_path
-        found = tested(model, method, run, TRANSITION, *ALONG, length, end, exact, work)
+        path = ALONG._replace(length=length, exact=exact)
+        found = tested(model, method, run, TRANSITION, path, end, work)
         if rests is not None:
-            assert given == [(model, method, run, TRANSITION, *ALONG, length, end, exact, work)]
+            assert given == [(model, method, run, TRANSITION, path, end, work)]
         return found, run
 
     @pytest.mark.parametrize("way", [1, -1])
@@ -432,7 +432,7 @@ class TestCrossingOnPath:
 
             model.field = field
             tested = plain(crossings, signs_beside=signs_beside).crossing_on_path
-            found = tested(model, method, run, TRANSITION, *ALONG, 2.0, 0.0, True, work)
+            found = tested(model, method, run, TRANSITION, ALONG._replace(length=2.0), 0.0, work)
             assert len(asked) == (fired == TRANSITION)
             if fired == TRANSITION:
                 assert found[0] == approx(expected, 4.0)

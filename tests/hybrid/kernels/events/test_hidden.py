@@ -8,13 +8,13 @@ import pytest
 
 from hybrid.kernels.events import hidden
 from hybrid.kernels.types.codes import HIGH, LOW
-from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.layout import EPSILON, Path
 from tests.hybrid.kernels.plain import plain
 
 kernels = plain(hidden)
 # One component, which is the place itself: time is 10 plus half of the place.
 PATH, CLOCK, START, PACE = np.array([[0.0], [1.0]]), -1, 10.0, 0.5
-ALONG = (PATH, 1, CLOCK, START, PACE)
+ALONG = Path(PATH, 1, CLOCK, START, PACE, 1.0, True)
 
 
 def memory():
@@ -46,8 +46,8 @@ def opaque(guard):
 def bounded(low, high):
     """A model whose guard has these bounds on the first half of each place."""
 
-    def bound(programs, program, path, order, clock, start, pace, middle, radius, registers):
-        assert (program, path is PATH, order, clock, start, pace) == (1, True, 1, CLOCK, START, PACE)
+    def bound(programs, program, path, middle, radius, registers):
+        assert (program, path is ALONG) == (1, True)
         assert middle == radius
         registers[2, LOW], registers[2, HIGH] = low(2.0 * middle), high(2.0 * middle)
         return 2
@@ -58,12 +58,12 @@ def bounded(low, high):
 
 def test_a_sample_is_the_guard_at_its_place_and_time():
     model = opaque(lambda t, x: 100.0 * t + x)
-    assert kernels.sample(model, 1, *ALONG, 4.0, memory()) == 1204.0
+    assert kernels.sample(model, 1, ALONG, 4.0, memory()) == 1204.0
 
 
 class TestFarthestFromZero:
     def far(self, model, place=2.0):
-        return kernels.farthest_from_zero(model, 1, *ALONG, place, memory())
+        return kernels.farthest_from_zero(model, 1, ALONG, place, memory())
 
     @pytest.mark.parametrize(("low", "high", "far"), [(-3.0, 2.0, 3.0), (-0.25, 0.5, 0.5), (1.0, 4.0, 4.0)])
     def test_is_the_farther_bound(self, low, high, far):
@@ -104,7 +104,9 @@ class TestHiddenUntil:
         ).hidden_until
         method = SimpleNamespace(atol=1e-3, rtol=0.25)
         run = SimpleNamespace(y=np.array([3.0]), scale=np.array([0.5]))
-        return tested(opaque(guard), method, run, 1, *ALONG, length, end, exact, memory())
+        return tested(
+            opaque(guard), method, run, 1, ALONG._replace(length=length, exact=exact), end, memory()
+        )
 
     def test_ends_where_the_guard_is_farther_from_zero_than_rounding(self):
         assert self.until(rounding=1e-6) == (2.0**-7, False)

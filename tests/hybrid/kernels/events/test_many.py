@@ -138,14 +138,21 @@ class TestManyRuns:
 
         tested = plain(many, mode_of_start=mode_of_start, set_words=self.set_words)
         task = SimpleNamespace(run=self.run, model=self.model)
+        starts = SimpleNamespace(
+            **{"reached": begin, "resumed": resumed, "max_steps": max_steps, "max_jumps": 50},
+            **{"run_words": self.run_words, "work_words": self.work_words},
+            **{"fresh_run": np.array([1, 2]), "fresh_work": np.array([3, 4, 5])},
+            **{"origins": self.origins, "named": 4, "found": self.places},
+            verdicts=np.array([self.verdict]),
+        )
         cycles = np.array(self.TIMES)
         self.steps = 0
-        return tested.many_runs(
-            *(self.advance, "parts", task),
-            *(self.run_words, np.array([1, 2]), self.work_words, np.array([3, 4, 5])),
-            *(self.origins, cycles, 0.5 * cycles, 4, begin, resumed, max_steps, budget, 50),
-            *(self.states, self.places, np.array([self.verdict]), self.reached),
+        code = tested.many_runs(
+            self.advance, "parts", task, starts, cycles, 0.5 * cycles, budget, self.states
         )
+        assert starts.resumed == (code == GO_ON)
+        self.reached[0] = starts.reached
+        return code
 
     def assert_complete(self, rows, origins):
         for row, origin in zip(rows, origins, strict=True):

@@ -7,8 +7,10 @@ import pytest
 
 from hybrid import Guard, HybridSystem, Mode, Taylor, Transition, simulate
 from hybrid.kernels.events import hidden, sampled
+from hybrid.kernels.events.crossings import Begin
 from hybrid.kernels.events.onset import BY_SPEED, BY_STEP
 from hybrid.kernels.events.sampled import NOWHERE, SAMPLES
+from hybrid.kernels.types.layout import Path
 from tests.hybrid.kernels.plain import plain
 
 
@@ -53,10 +55,8 @@ class TestAlongAPath:
         model = SimpleNamespace(dimension=1, parameters=None, guard=write, direction=np.array([9, direction]))
         run = SimpleNamespace(unproved=4, last_fired=1 if fired else 0, since_entry=0.0, passed=np.zeros(2))
         work = SimpleNamespace(state=np.zeros(1), scalar=np.zeros(1))
-        path = np.array([[-1.0], [1.0]])
-        found = plain(sampled).sampled_change(
-            model, run, 1, path, 1, -1, 10.0, 0.5, length, side, on_guard, hidden, work
-        )
+        path = Path(np.array([[-1.0], [1.0]]), 1, -1, 10.0, 0.5, length, True)
+        found = plain(sampled).sampled_change(model, run, 1, path, Begin(side, on_guard, hidden), work)
         assert run.unproved == 5
         return found
 
@@ -111,7 +111,8 @@ def test_how_far_a_guard_comes_from_zero_at_eight_places():
         model = SimpleNamespace(dimension=1, parameters=None, guard=write)
         work = SimpleNamespace(state=np.zeros(1), scalar=np.zeros(1))
         kernels = plain(hidden, has_program=lambda *arguments: False)
-        return kernels.farthest_from_zero(model, 1, np.array([[-1.0], [1.0]]), 1, -1, 10.0, 0.5, place, work)
+        path = Path(np.array([[-1.0], [1.0]]), 1, -1, 10.0, 0.5, 2.0, True)
+        return kernels.farthest_from_zero(model, 1, path, place, work)
 
     for place in np.arange(1, 9) / 4:
         for value in (0.5, -0.5):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from hybrid.kernels.events import sections
-from hybrid.kernels.types.codes import DONE, MAX_STEPS
+from hybrid.kernels.types.codes import DONE, MAX_STEPS, UNLIMITED
 from tests.hybrid.kernels.plain import plain
 
 kernels = plain(sections)
@@ -15,7 +15,7 @@ def strobed(count, fails_in=None):
     """The points of a run in cycle 6 that jumps twice per cycle; it does not reach one of the cycles."""
 
     def advance(parts, task, cycle, phase, max_steps, max_jumps):
-        assert (parts, phase, max_steps, max_jumps) == ("parts", 0.25, 100, 50)
+        assert (parts, phase, max_steps, max_jumps) == ("parts", 0.25, 100, UNLIMITED)
         if cycle == fails_in:
             return MAX_STEPS
         run = task.run
@@ -27,7 +27,7 @@ def strobed(count, fails_in=None):
         model=SimpleNamespace(dimension=2), run=SimpleNamespace(y=np.zeros(2), cycle=6, mode=0, jumps=10)
     )
     states, places, reached = np.full((count, 2), 88.0), np.full((count, 3), 88), np.array([88])
-    code = kernels.strobe(advance, "parts", task, 0.25, 100, 50, states, places, reached)
+    code = kernels.strobe(advance, "parts", task, 0.25, 100, states, places, reached)
     return code, reached[0], states.tolist(), places.tolist()
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from hybrid.kernels.steps import forcing
 from hybrid.kernels.steps.forcing import MARGIN, ROUNDING
+from hybrid.kernels.types.layout import Path
 from tests.hybrid.kernels.plain import plain
 
 ATOL, RTOL = 0.5, 0.25
@@ -16,6 +17,10 @@ START, ALONG = np.array([3.0, -4.0, 6.0, -8.0]), np.array([1.0, -9.0, 2.0, 8.0])
 FLOORS = np.array([ATOL, ATOL, *[RTOL * np.sqrt(50.0)] * 2])
 FIELD = np.array([2.0, -3.0, 5.0, -7.0])
 ALLOWED = MARGIN * (FLOORS + (RTOL + ROUNDING) * np.array([3.0, 9.0, 6.0, 8.0]))
+
+
+def path_on(clock, length):
+    return Path(None, 5, clock, 7.0, 1.0, length, False)
 
 
 def follows(gaps, *, tangents=1, noise=(0.0,) * 4, noisy=False, clock=-1, ends=False):
@@ -52,7 +57,7 @@ def follows(gaps, *, tangents=1, noise=(0.0,) * 4, noisy=False, clock=-1, ends=F
         _value_and_slope=value_and_slope,
         _is_beyond_guard=lambda *given: ends,
     )
-    found = bool(tested._follows_field(model, method, run, tangents, 5, clock, 2.0, noisy, work))
+    found = bool(tested._follows_field(model, method, run, tangents, path_on(clock, 2.0), noisy, work))
     # The first node is the start, where both are the same.
     expected = [7.0 + pace * 2.0 * node for node in nodes[1:] if not ends]
     assert times == pytest.approx(expected if not noisy else np.repeat(expected, 2), rel=1e-14)
@@ -102,7 +107,7 @@ def test_the_rounding_of_the_state_moves_its_components_both_ways():
     work = SimpleNamespace(series=None, stages=np.zeros((2, 4)), jacobian=None)
     work.error, work.trial, work.new = np.zeros(4), np.zeros(4), np.zeros(4)
     run = SimpleNamespace(mode=1, phase=7.0, y=START)
-    assert tested._follows_field(SimpleNamespace(dimension=2), method, run, 1, 5, -1, 2.0, True, work)
+    assert tested._follows_field(SimpleNamespace(dimension=2), method, run, 1, path_on(-1, 2.0), True, work)
     exact, rounded = moved
     assert exact.tolist() == [0.0] * 4
     assert np.abs(rounded) == pytest.approx(ROUNDING, rel=0.1)
@@ -125,7 +130,7 @@ def test_a_vector_of_one_component_has_no_absolute_size(gap, expected):
     work = SimpleNamespace(series=None, stages=np.zeros((2, 2)), jacobian=None)
     work.error, work.trial, work.new = np.zeros(2), np.zeros(2), np.zeros(2)
     run = SimpleNamespace(mode=1, phase=7.0, y=np.ones(2))
-    found = tested._follows_field(SimpleNamespace(dimension=1), method, run, 1, 5, -1, 1.0, False, work)
+    found = tested._follows_field(SimpleNamespace(dimension=1), method, run, 1, path_on(-1, 1.0), False, work)
     assert bool(found) == expected
 
 

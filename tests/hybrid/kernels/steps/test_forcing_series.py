@@ -1,6 +1,5 @@
 """A series on a forced step: its values, whether it is finite, where the mode ends, how long the step is."""
 
-import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 
 from hybrid.kernels.steps import forcing
 from hybrid.kernels.types.codes import NARROW
-from hybrid.kernels.types.layout import EPSILON
 from tests.hybrid.kernels.plain import plain
 
 kernels = plain(forcing)
@@ -106,69 +104,3 @@ def test_a_guard_that_is_passed_on_the_clock(side):
     assert beyond(near, far)
     run.mode = 0
     assert not beyond(far, far)
-
-
-class TestExplainedSeries:
-    """A step of a length, of which ``explains`` says how much each trial is left by the forcing."""
-
-    def step(self, follows, *, explains=lambda h: h, clock=-1, finite=True, unresolved=0, length=1.0):
-        asked = []
-
-        def longest(model, method, run, path, order, told, nodes, timed, swings, seen, h, work):
-            assert (path, order, told, nodes, timed) == ("series", 5, clock, "nodes", True)
-            # A pulse in the state is looked for if an argument changes enough on this very step.
-            assert (swings, seen) == (h > 0.3, False)
-            asked.append(h)
-            return explains(h)
-
-        def change(model, mode, path, order, told, start, h, work):
-            assert (mode, path, order, told, start) == (1, "series", 5, clock, 3.0)
-            return h > 0.3
-
-        def follow(model, method, run, tangents, order, told, h, noisy, work):
-            assert (tangents, order, told) == (2, 5, clock)
-            return follows(h, noisy)
-
-        tested = plain(
-            forcing,
-            _is_finite=lambda *given: finite,
-            _longest_explained=longest,
-            _arguments_change=change,
-            _follows_field=follow,
-            measured_time=lambda model, run, mode: 4.0,
-        )
-        self.asked, self.run = asked, SimpleNamespace(mode=1, phase=3.0, unresolved=unresolved)
-        method, work = SimpleNamespace(series_nodes="nodes"), SimpleNamespace(series="series")
-        return tested.explained_series(None, method, self.run, 2, 5, clock, length, work)
-
-    def test_a_series_that_is_not_finite(self):
-        assert math.isnan(self.step(lambda h, noisy: True, finite=False))
-        assert self.asked == []
-
-    def test_noise_is_asked_only_if_the_field_is_not_followed_without(self):
-        noises = []
-        assert self.step(lambda h, noisy: noises.append(noisy) or not noisy) == 1.0
-        assert noises == [False]
-        noises = []
-        assert self.step(lambda h, noisy: noises.append(noisy) or noisy) == 1.0
-        assert noises == [False, True]
-
-    def test_it_is_cut_as_far_as_it_is_explained_then_halved(self):
-        assert self.step(lambda h, noisy: True, explains=lambda h: 0.75 * h) == 0.75
-        assert self.step(lambda h, noisy: h < 0.3, explains=lambda h: min(h, 0.75)) == 0.1875
-        assert self.asked == [1.0, 0.375, 0.1875]
-        assert self.run.unresolved == 0
-
-    def test_no_step_is_shorter_than_rounding_allows(self):
-        """64 units of the time 4, and one of the step; a clock has no time to measure."""
-        for clock, length, shortest in (
-            (-1, 1.0, 257.0 * EPSILON),
-            (-1, 64.0, 320.0 * EPSILON),
-            (0, 1.0, EPSILON),
-            (2, 0.25, 0.25 * EPSILON),
-        ):
-            found = self.step(lambda h, noisy: False, clock=clock, length=length)
-            assert 0.5 * shortest < found <= shortest
-            assert self.run.unresolved == 1
-        # After many of them the longest step is taken.
-        assert self.step(lambda h, noisy: False, unresolved=100) == 1.0

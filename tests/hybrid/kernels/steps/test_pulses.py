@@ -11,12 +11,22 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.steps import pulses
-from hybrid.kernels.steps.pulses import BETWEEN, BETWEEN_IN_STATE, EXPLAINED, FLAT, HIDDEN, NOISY, UNKNOWN
+from hybrid.kernels.steps.pulses import (
+    BETWEEN,
+    BETWEEN_IN_STATE,
+    EXPLAINED,
+    FLAT,
+    HIDDEN,
+    NOISY,
+    UNKNOWN,
+    Samples,
+)
+from hybrid.kernels.types.layout import Path
 from tests.hybrid.kernels.plain import plain
 
 kernels = plain(pulses)
-PATH, ORDER, CLOCK, START = np.zeros((2, 1)), 1, -1, 7.0
-ALONG = (PATH, ORDER, CLOCK, START)
+START = 7.0
+ALONG = Path(np.zeros((2, 1)), 1, -1, START, 1.0, 1.0, False)
 NODES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 CALM = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -34,8 +44,8 @@ def model_of(*rows, checked=(0, 1, 1)):
     """A model whose rows are functions of the middle and the radius of a piece, and what it was asked for."""
     asked = []
 
-    def bound(programs, program, path, order, clock, start, pace, middle, radius, registers):
-        assert (program, path is PATH, order, clock, start, pace) == (1, True, ORDER, CLOCK, START, 1.0)
+    def bound(programs, program, path, middle, radius, registers):
+        assert (program, path[:5]) == (1, ALONG[:5])
         asked.append((middle, radius))
         for place, row in enumerate(rows):
             registers[place] = row(middle, radius)
@@ -53,7 +63,7 @@ def fixed(*entries):
 class TestIsSteady:
     def steady(self, *rows, negligible=0.25, h=2.0, checked=(0, 1, 1)):
         model, asked = model_of(*rows, checked=checked)
-        found = kernels.is_steady(model, 1, *ALONG, h, negligible, memory())
+        found = kernels.is_steady(model, 1, ALONG._replace(length=h), negligible, memory())
         assert asked[0] == (0.5 * h, 0.5 * h)
         assert asked[1:] in ([], [(0.3819 * h, 0.0)])
         return found
@@ -116,7 +126,7 @@ def test_samples():
         lambda middle, radius: (-99.0, 99.0, 0.0, 0.0, *ends[middle]),
     )
     work = memory()
-    kernels._take_samples(model, 1, *ALONG, NODES, 2.0, False, work)
+    kernels._take_samples(model, 1, ALONG._replace(length=2.0), Samples(NODES, False), work)
     assert asked == [(2.0 * node, 0.0) for node in NODES]
     assert work.samples[:, :2].tolist() == [[8.0, 9.0]] * 6
     assert work.samples[:, 2:4].tolist() == [[-8.0, -7.0]] * 6
@@ -156,8 +166,10 @@ class TestJudged:
         return work
 
     def judged(self, work, *, whole=False, length=1.0, negligible=0.0, tolerance=0.0, between=0.25):
-        programs = SimpleNamespace(checked=np.array([0, 0, 0, 1, 1]))
-        return kernels._judged(programs, 2, 2, 1, whole, length, negligible, tolerance, between, work)
+        programs = SimpleNamespace(checked=np.array([0, 0, 0, 1, 1]), first=np.array([0, 2, 5]))
+        tolerance /= pulses.SHARE_OF_PIECE
+        demand = pulses.Demand(tolerance, negligible, between, math.nan, 1, False)
+        return kernels._judged(programs, 1, 1, whole, length, demand, work)
 
     def test_what_lies_beyond_the_samples(self):
         for row, beyond in (
@@ -296,7 +308,8 @@ class TestFirstHidden:
     def hidden(self, forcing, part=None, *, h=1.0, tolerance=1e-6, finest=1e-12, of_state=False, nodes=NODES):
         model, asked = model_of(fixed(*CALM), part or fixed(*CALM), forcing)
         work = memory(len(nodes))
-        found = kernels.first_hidden(model, 1, *ALONG, nodes, h, tolerance, finest, of_state, False, work)
+        demand, path = kernels.demand_on(h, tolerance, finest, of_state), ALONG._replace(length=h)
+        found = kernels.first_hidden(model, 1, path, Samples(nodes, False), demand, work)
         return found, asked
 
     def test_one_evaluation_explains_a_monotone_forcing(self):

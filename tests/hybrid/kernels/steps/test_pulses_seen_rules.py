@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tests.hybrid.kernels.steps.test_pulses import ALONG, CALM, CLOCK, ORDER, PATH, START, kernels, memory
+from hybrid.kernels.steps.pulses import Samples
+from tests.hybrid.kernels.steps.test_pulses import ALONG, CALM, START, kernels, memory
 
 
 class TestSeen:
@@ -20,16 +21,17 @@ class TestSeen:
         )
         asked = []
 
-        def bound(programs, program, path, order, clock, start, pace, middle, radius, registers):
-            if path is PATH:
-                assert (order, clock, start, pace) == (ORDER, CLOCK, START, 1.0)
+        def bound(programs, program, path, middle, radius, registers):
+            if path.powers is ALONG.powers:
+                assert path[:5] == ALONG[:5]
                 value = along(middle)
                 least, most = sorted((along(middle - radius), along(middle + radius)))
                 row = (min(least, value), max(most, value), -1.0, 1.0, value, value)
             else:
-                assert (order, clock, pace, middle, radius, path.shape) == (0, -1, 1.0, 0.0, 0.0, (1, 2))
-                asked.append(start - START)
-                row = (*[path[0, 0]] * 2, 0.0, 0.0, *[path[0, 0]] * 2)
+                assert (path.degree, path.clock, path.pace, middle, radius) == (0, -1, 1.0, 0.0, 0.0)
+                assert path.powers.shape == (1, 2)
+                asked.append(path.start - START)
+                row = (*[path.powers[0, 0]] * 2, 0.0, 0.0, *[path.powers[0, 0]] * 2)
             registers[0], registers[1], registers[2] = CALM, CALM, row
             return 2
 
@@ -37,9 +39,9 @@ class TestSeen:
         model = SimpleNamespace(programs=programs, bound=bound, dimension=1)
         work = memory(len(self.NODES))
         work.places = places
-        found = kernels.first_hidden(
-            model, 1, *ALONG, self.NODES, self.H, 0.0, 1e-9, True, seen_at_nodes, work
-        )
+        demand = kernels.demand_on(self.H, 0.0, 1e-9, True)
+        path, at = ALONG._replace(length=self.H), Samples(self.NODES, seen_at_nodes)
+        found = kernels.first_hidden(model, 1, path, at, demand, work)
         return found, asked
 
     def test_a_pulse_at_a_node_that_the_method_has_not_seen_is_hidden(self):

@@ -37,8 +37,7 @@ class Landing:
             stages=np.zeros((2, 4)),
         )
 
-        def attempt_again(parts, model, method, mode, t, length, y, tangents, work):
-            assert (parts, mode, t, y.tolist(), tangents) == ("parts", 5, self.T, [0.0], 2)
+        def attempt_again(task, length):
             self.tried.append(length)
             work.new[:3] = length, 20.0, 30.0
             work.stages[1, :3] = 1.0, 2.0, -4.0
@@ -61,23 +60,15 @@ class Landing:
             guard_gradient=write_gradient,
             parameters=None,
         )
-        tested = plain(runge_kutta_guards, attempt_again=attempt_again)
+        tested = plain(
+            runge_kutta_guards, attempt_again=attempt_again, measured_time=lambda *given: np.float64(rounding)
+        )
+        method, run = SimpleNamespace(b=np.zeros(1)), SimpleNamespace(mode=5, phase=self.T, y=np.array([0.0]))
+        task = SimpleNamespace(
+            attempts=None, model=model, method=method, run=run, record=None, work=work, tangents=2
+        )
         with np.errstate(all="ignore"):
-            self.length, self.correction = tested.land(
-                "parts",
-                model,
-                SimpleNamespace(b=np.zeros(1)),
-                1,
-                side,
-                5,
-                self.T,
-                np.float64(rounding),
-                np.float64(h),
-                np.float64(theta),
-                np.array([0.0]),
-                2,
-                work,
-            )
+            self.length, self.correction = tested.land(task, 1, side, np.float64(h), np.float64(theta))
         self.new = work.new.tolist()
 
     @property
@@ -419,8 +410,8 @@ class TestReachAny:
 def first_landing(zeros, fired, *, side=(1, 1, 1), passed=NO_ROOT, missing=(), asked=None):
     """Length and transition of a landing on a step of 4 from the time 7, with guards zero after ``zeros``."""
 
-    def land(parts, model, method, transition, side, mode, t, rounding, h, theta, y, tangents, work):
-        assert (side, mode, t, rounding) == (1, 1, 7.0, 9.0)
+    def land(task, transition, side, h, theta):
+        assert side == 1
         if asked is not None:
             asked.append((transition, h, theta))
         return (NOT_THERE, 0.0) if transition in missing else (zeros[transition] - 0.125, 0.125)
@@ -433,9 +424,9 @@ def first_landing(zeros, fired, *, side=(1, 1, 1), passed=NO_ROOT, missing=(), a
     run = SimpleNamespace(
         mode=1, y=None, side=np.array(side), rehearsal=np.ones((4, 3), dtype=int), passed=np.full(3, passed)
     )
-    length, correction, first = tested.land_on_first(
-        None, model, None, run, fired, 7.0, 9.0, 4.0, 0.5, 0, None
-    )
+    run.phase = 7.0
+    task = SimpleNamespace(attempts=None, model=model, method=None, run=run, record=None, work=None)
+    length, correction, first = tested.land_on_first(task, fired, 4.0, 0.5)
     return length + correction, first
 
 

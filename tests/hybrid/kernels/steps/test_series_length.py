@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.steps import series_length
+from hybrid.kernels.steps.series_length import Columns, Tolerance
 from tests.hybrid.kernels.plain import plain
 
 
@@ -16,12 +17,12 @@ FIRST, STRIDE = 8, 20
 
 
 def length_of(series, order, n, groups, rtol, exact, regular=False):
-    weights = np.zeros((1, series.shape[1]))
+    weights, tolerance = np.zeros((1, series.shape[1])), Tolerance(rtol, 0.0 if exact else rtol / 100, exact)
     length, last, growth = KERNELS.longest_step(
-        series, n, FIRST, STRIDE, groups, order, rtol, 0.0 if exact else rtol / 100, exact, weights
+        series, Columns(n, FIRST, STRIDE, groups), order, tolerance, weights
     )
     if regular:
-        return KERNELS.is_regular(series, n, order, rtol, exact, weights, last, growth)
+        return KERNELS.is_regular(series, n, order, tolerance, last, growth, weights)
     return length
 
 
@@ -83,5 +84,5 @@ def test_at_rest_at_the_origin_one_of_the_first_terms_is_the_size(k):
     """The floor is a thousandth of the relative tolerance, of the largest component."""
     series, weights = np.zeros((6, 4)), np.full((1, 4), 9.0)
     series[k], series[4:] = [0.5, -8.0, 2.0, 0.0], 1e9
-    KERNELS.weigh_state(series, 4, 1e-6, 7.0, True, weights)
+    KERNELS.weigh_state(series, 4, Tolerance(1e-6, 7.0, True), weights)
     np.testing.assert_allclose(weights[0], 1.0 / (1e-3 * 1e-6 * 8.0), rtol=1e-12)

@@ -9,9 +9,16 @@ from hypothesis import strategies as st
 
 from hybrid.kernels.steps import series_roots
 from hybrid.kernels.types.codes import HIGHEST_ORDER as ORDER
+from hybrid.kernels.types.layout import Path
 from tests.hybrid.kernels.plain import plain
 
 kernels = plain(series_roots)
+
+
+def _sought(series, column, known_roots, h, low, high, left, right, side):
+    """The arguments of ``root_between`` for a step of length ``h``."""
+    path = Path(series, len(series) - 1, -1, 0.0, 1.0, h, True)
+    return path, column, known_roots, series_roots.Bracket(low, high, left, right), side
 
 
 def _beside(powers):
@@ -27,9 +34,7 @@ def _root(powers, known_roots, low, high):
     left, _, _ = _expanded(powers, known_roots, low)
     right, _, _ = _expanded(powers, known_roots, high)
     side = 1 if left > 0.0 else -1
-    return kernels.root_between(
-        _beside(powers), 1, len(powers) - 1, known_roots, 1.0, low, high, left, right, side
-    )
+    return kernels.root_between(*_sought(_beside(powers), 1, known_roots, 1.0, low, high, left, right, side))
 
 
 @pytest.mark.parametrize("order", [1, 2, 3, 8, 27, 28])
@@ -66,7 +71,7 @@ def test_a_root_to_rounding():
 
 def _root_with_ends(powers, low, high, left, right):
     side = 1 if left > 0.0 else -1
-    return kernels.root_between(_beside(powers), 1, len(powers) - 1, 0, 1.0, low, high, left, right, side)
+    return kernels.root_between(*_sought(_beside(powers), 1, 0, 1.0, low, high, left, right, side))
 
 
 def test_a_root_that_rounding_puts_on_the_other_side_of_an_end():
@@ -94,7 +99,7 @@ def test_a_root_is_one_of_the_whole_series(known_roots, rounding):
     series[:, 0] = 0.0
     series[known_roots, 0], series[known_roots + 1, 0] = -1.0, 1.0
     series[0, 0] += rounding
-    found = kernels.root_between(series, 0, 3, known_roots, 2.0, 0.5, 1.5, -0.5, 0.5, -1)
+    found = kernels.root_between(*_sought(series, 0, known_roots, 2.0, 0.5, 1.5, -0.5, 0.5, -1))
     # To first order; for ``s - 1`` that is exact.
     assert found == pytest.approx(1.0 - rounding, rel=0, abs=1e-15 if known_roots == 0 else 1e-17 / 1e-2)
 
@@ -102,7 +107,7 @@ def test_a_root_is_one_of_the_whole_series(known_roots, rounding):
 def test_a_root_is_not_moved_to_the_start_of_a_step():
     """A value of rounding at the start, as large as the guard where it turns, is none of the way."""
     series = np.array([[-0.5], [-1.0], [1.0]])
-    found = kernels.root_between(series, 0, 2, 1, 2.0, 0.5, 1.5, -0.5, 0.5, -1)
+    found = kernels.root_between(*_sought(series, 0, 1, 2.0, 0.5, 1.5, -0.5, 0.5, -1))
     assert found == 1.0
 
 
@@ -179,31 +184,33 @@ def test_a_root_is_found_in_a_few_steps(powers, ends, root, steps, unit):
     series = (powers / unit ** np.arange(float(len(powers))))[:, None]
     low, high = np.array(ends) * unit
     side = 1 if left > 0.0 else -1
-    found = tested.root_between(series, 0, len(powers) - 1, 0, unit, low, high, 2.0 * left, 2.0 * right, side)
+    found = tested.root_between(*_sought(series, 0, 0, unit, low, high, 2.0 * left, 2.0 * right, side))
     assert found == pytest.approx(root * unit, rel=1e-8 if steps == 5 else 1e-15, abs=0.0)
     assert len(calls) <= steps
 
 
 def test_the_ends_of_a_bracket_have_values_up_to_a_factor():
     """The secant of the given values leads to 1/2, where the series is 1, and Newton's method from there."""
-    assert kernels.root_between(np.array([[-1.0], [4.0]]), 0, 1, 0, 1.0, 0.0, 1.0, -1.0, 1.0, -1) == 0.25
+    assert (
+        kernels.root_between(*_sought(np.array([[-1.0], [4.0]]), 0, 0, 1.0, 0.0, 1.0, -1.0, 1.0, -1)) == 0.25
+    )
 
 
 def test_where_the_slope_is_zero_the_bracket_is_halved():
     """``(s - 1/2)^3 + 1/64`` in the middle of the bracket."""
     series = np.array([[-1 / 8 + 1 / 64], [3 / 4], [-3 / 2], [1.0]])
     tested, calls = counted()
-    assert tested.root_between(series, 0, 3, 0, 1.0, 0.0, 1.0, -1.0, 1.0, -1) == 0.25
+    assert tested.root_between(*_sought(series, 0, 0, 1.0, 0.0, 1.0, -1.0, 1.0, -1)) == 0.25
     assert len(calls) == 2
 
 
 def test_a_root_outside_of_the_bracket_is_not_found():
     """The secant ends at an end of the bracket, by rounding, and another root is next to it."""
     series = cubic(0.34, 0.7)[:, None]
-    found = kernels.root_between(series, 0, 2, 0, 1.0, 0.5, 1.0, -1.0, 1e-17, -1)
+    found = kernels.root_between(*_sought(series, 0, 0, 1.0, 0.5, 1.0, -1.0, 1e-17, -1))
     assert found == pytest.approx(0.7, rel=4e-16)
     series = cubic(0.49, 0.9)[:, None]
-    found = kernels.root_between(series, 0, 2, 0, 1.0, 0.5, 1.0, -1e-17, 1.0, -1)
+    found = kernels.root_between(*_sought(series, 0, 0, 1.0, 0.5, 1.0, -1e-17, 1.0, -1))
     assert found == pytest.approx(0.9, rel=4e-16)
 
 
@@ -213,7 +220,7 @@ def test_what_is_left_at_the_start_moves_a_root(unit):
     for rest, moves in ((1.9e-6, True), (-1.9e-6, True), (2.1e-6, False), (-2.1e-6, False), (3.9e-6, False)):
         tested, calls = counted()
         series = np.array([rest, -1.0 / unit, 1.0 / unit**2])[:, None]
-        found = tested.root_between(series, 0, 2, 1, 2.0 * unit, 0.4 * unit, 1.5 * unit, -0.6, 0.5, -1)
+        found = tested.root_between(*_sought(series, 0, 1, 2.0 * unit, 0.4 * unit, 1.5 * unit, -0.6, 0.5, -1))
         scaled = 0.5 * (1.0 + math.sqrt(1.0 - 4.0 * rest)) if moves else 1.0
         assert found == pytest.approx(scaled * unit, rel=4e-16, abs=0.0)
         assert len(calls) <= (5 if moves else 2)
@@ -222,9 +229,8 @@ def test_what_is_left_at_the_start_moves_a_root(unit):
 def test_a_root_next_to_the_start_is_moved_by_less_than_its_half():
     for rest, share in ((1e-13, 1.0), (1.08e-12, 0.0)):
         root = 1.2e-6
-        found = kernels.root_between(
-            np.array([[rest], [-root], [1.0]]), 0, 2, 1, 1.0, 1e-7, 1.0, -1.0, 1.0, -1
-        )
+        series = np.array([[rest], [-root], [1.0]])
+        found = kernels.root_between(*_sought(series, 0, 1, 1.0, 1e-7, 1.0, -1.0, 1.0, -1))
         moved = 0.5 * (root + math.sqrt(root**2 - 4.0 * share * rest))
         assert found == pytest.approx(moved, rel=1e-9, abs=0.0)
 
@@ -238,5 +244,5 @@ def test_a_root_beside_one_at_an_end_of_the_bracket(low, high, other, at_end, si
     before = side if low < 0.5 else -side
     left, right = np.polynomial.polynomial.polyval((low, high), powers)
     left, right = (at_end, right) if other == low else (left, at_end)
-    found = kernels.root_between(_beside(powers), 1, 2, 0, 1.0, low, high, left, right, before)
+    found = kernels.root_between(*_sought(_beside(powers), 1, 0, 1.0, low, high, left, right, before))
     assert found == pytest.approx(0.6, rel=1e-15)

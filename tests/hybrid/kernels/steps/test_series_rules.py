@@ -16,9 +16,17 @@ from hybrid.kernels.types.codes import (
     READY,
     STALE,
 )
+from hybrid.kernels.types.layout import Path
 from tests.hybrid.kernels.plain import plain
 
 kernels = plain(module, power_of_two=np.exp2)
+
+
+def path_of(series, h, clock=-1):
+    """The path of a series of the second order from the time ``T``."""
+    return Path(series, 2, clock, T, 1.0, h, False)
+
+
 MODE, T = 1, 3.0
 
 
@@ -38,7 +46,9 @@ class TestFollowed:
         series = np.array([[scale], [2.0 * scale], [0.0]])
         model = SimpleNamespace(dimension=1, parameters=None, field=field)
         work = SimpleNamespace(series=series, trial=np.zeros(1), stages=np.zeros((2, 1)))
-        return kernels.followed(model, method, SimpleNamespace(mode=MODE, y=np.array([scale])), 2, T, h, work)
+        return kernels.followed(
+            model, method, SimpleNamespace(mode=MODE, y=np.array([scale])), path_of(series, h), work
+        )
 
     def test_a_step_with_a_misfit_is_halved(self):
         """A quarter of the step times the misfit, at the middle or at the end."""
@@ -85,7 +95,7 @@ def test_rounding_is_tried_in_both_directions():
     series = np.vstack([np.full(5, 2.0), np.zeros((2, 5))])
     work = SimpleNamespace(series=series, trial=np.zeros(5), stages=np.zeros((2, 5)))
     run = SimpleNamespace(mode=MODE, y=np.full(5, 2.0))
-    kernels.followed(model, SimpleNamespace(atol=1.0, rtol=0.0), run, 2, T, 0.5, work)
+    kernels.followed(model, SimpleNamespace(atol=1.0, rtol=0.0), run, path_of(series, 0.5), work)
     assert len(seen) == 4
     assert seen[0].tolist() == seen[2].tolist() == [2.0] * 5
     signs = np.array([1.0, 1.0, -1.0, -1.0, 1.0])
@@ -101,15 +111,19 @@ def test_a_clock_stops_at_the_end_of_the_run(clock, root, remaining):
     series[:2, root] = 1.0, 0.0
     series[1:, clock] = 1.0, 1.0
     expected = (math.sqrt(1.0 + 4.0 * remaining) - 1.0) / 2.0
-    assert kernels.step_until(series, clock, 2, 3.0, remaining, work) == pytest.approx(expected, rel=1e-14)
+    assert kernels.step_until(path_of(series, 3.0, clock), remaining, work) == pytest.approx(
+        expected, rel=1e-14
+    )
     # Where the end is not reached the step is kept.
-    assert kernels.step_until(series, clock, 2, 0.5, 0.76, work) == 0.5
+    assert kernels.step_until(path_of(series, 0.5, clock), 0.76, work) == 0.5
     # The root is ``1 - s``: beyond 1 its clock runs backwards.
     series[:2, root] = 1.0, -1.0
     series[1:, clock] = 2.0, -1.0
     expected = 1.0 - math.sqrt(1.0 - remaining)
-    assert kernels.step_until(series, clock, 2, 3.0, remaining, work) == pytest.approx(expected, rel=1e-14)
-    assert kernels.step_until(series, clock, 2, 3.0, 1.25, work) == 3.0
+    assert kernels.step_until(path_of(series, 3.0, clock), remaining, work) == pytest.approx(
+        expected, rel=1e-14
+    )
+    assert kernels.step_until(path_of(series, 3.0, clock), 1.25, work) == 3.0
 
 
 class TestAccept:
@@ -135,7 +149,7 @@ class TestAccept:
             y=np.full(2 * (1 + max(tangents, 5)), -1.0),
             divergence=1.0,
         )
-        kernels.accept_series(model, run, tangents, order, 0.5, SimpleNamespace(series=series))
+        kernels.accept_series(model, run, tangents, path_of(series, 0.5), SimpleNamespace(series=series))
         return run, series
 
     def test_sizes(self):
@@ -164,8 +178,7 @@ def test_a_step_is_kept_as_polynomials_in_its_share(clock):
     series = np.arange(20.0).reshape(5, 4)
     record = SimpleNamespace(step_coefficients=np.full((2, 5, 3), 9.0))
     tested = plain(module, start_record=lambda run, record, t, span: 1).remember_series
-    work, model = SimpleNamespace(series=series), SimpleNamespace(dimension=2)
-    tested(model, None, record, 2, T, 0.5, 0.25, clock, work)
+    tested(SimpleNamespace(dimension=2), None, record, path_of(series, 0.5, clock), 0.25)
     assert np.all(record.step_coefficients[0] == 9.0)
     time = [0.0, 0.25, 0.0] if clock < 0 else [3.0, 3.5, 2.75]
     expected = [[0.0, 1.0, time[0]], [2.0, 2.5, time[1]], [2.0, 2.25, time[2]], [0.0] * 3, [0.0] * 3]

@@ -189,20 +189,6 @@ class TestExplicit:
             found.append(rate)
         return np.array(found)
 
-    @pytest.mark.parametrize("tangents", [0, 1, 2])
-    @pytest.mark.parametrize("again", [False, True])
-    def test_a_step(self, tangents, again):
-        model, method, y, work = self.attempt(tangents)
-        h, given = 0.25, (model, method, 1, 0.5, 0.25, y, tangents, work)
-        tried = kernels.attempt_again if again else kernels.attempt
-        ratio = tried(None, *given)
-        stages = self.expected(y, h, 4)
-        assert work.stages[:4, : y.size] == pytest.approx(stages, rel=1e-14)
-        assert work.new == pytest.approx(y + h * self.B @ stages[:3], rel=1e-14)
-        assert work.error == pytest.approx(stages[0] - stages[2], rel=1e-12)
-        assert work.second_error == pytest.approx(stages[1] - stages[3], rel=1e-12)
-        assert ratio == kernels.error_ratio(method, h, y, 2, tangents, work) > 0.0
-
     def test_stages_of_the_interpolant_are_those_of_the_state_alone(self):
         model, method, y, work = self.attempt(1)
         kernels.attempt_explicit(model, method, 1, 0.5, 0.25, y, 1, work)
@@ -211,13 +197,6 @@ class TestExplicit:
         assert work.stages[4, :2] == pytest.approx(self.expected(y, 0.25, 5)[4, :2], rel=1e-14)
         assert work.stages[4, 2:].tolist() == [88.0] * 5
         assert work.stages[:4, :4] == pytest.approx(self.expected(y, 0.25, 4), rel=1e-14)
-
-    def test_an_implicit_method_has_a_step_of_its_own(self):
-        parts = SimpleNamespace(attempt_implicit=lambda *given: given)
-        method = SimpleNamespace(implicit=1)
-        for tried in (kernels.attempt, kernels.attempt_again):
-            given = ("model", method, 1, 0.5, 0.25, "y", 2, "work")
-            assert tried(parts, *given) == given
 
 
 def test_the_interpolant_as_powers():
