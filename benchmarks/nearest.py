@@ -157,7 +157,6 @@ NEAREST = {
         "kernels/events/test_domain.py",
     ),
     "hybrid/kernels/events/sides.py": (
-        "kernels/events/test_side_rules.py",
         "kernels/jumps/test_instant.py",
         "kernels/jumps/test_instant_rules.py",
         "kernels/events/test_onset.py",
@@ -182,7 +181,6 @@ NEAREST = {
         "kernels/jumps/test_rounds.py",
     ),
     "hybrid/kernels/jumps/corner.py": (
-        "kernels/jumps/test_corner_rules.py",
         "kernels/jumps/test_instant_rules.py",
         "kernels/jumps/test_instant.py",
     ),
@@ -193,7 +191,6 @@ NEAREST = {
     ),
     "hybrid/kernels/jumps/endless.py": ("kernels/jumps/test_endless.py",),
     "hybrid/kernels/jumps/jump.py": (
-        "kernels/jumps/test_jump_rules.py",
         "kernels/jumps/test_steep.py",
         "simulation/test_saltation.py",
         "kernels/jumps/test_instant.py",
@@ -228,7 +225,6 @@ NEAREST = {
     ),
     "hybrid/kernels/steps/radau.py": ("kernels/steps/test_radau_rules.py", "solvers/test_radau.py"),
     "hybrid/kernels/steps/runge_kutta.py": (
-        "kernels/steps/test_runge_kutta_step.py",
         "accuracy/test_order.py",
         "solvers/test_tableau.py",
         "solvers/test_taylor.py",
@@ -246,7 +242,6 @@ NEAREST = {
     ),
     "hybrid/kernels/steps/series.py": (
         "kernels/steps/test_series_rules.py",
-        "kernels/steps/test_series_step.py",
         "compiler/taylor/test_series.py",
         "solvers/test_taylor.py",
         "solvers/test_fragile_series.py",
@@ -281,7 +276,6 @@ NEAREST = {
     "hybrid/orbits/newton.py": ("orbits/test_periodic_orbit.py",),
     "hybrid/orbits/held.py": ("orbits/test_conserved.py",),
     "hybrid/orbits/shooting.py": (
-        "orbits/test_shooting_rules.py",
         "orbits/test_objections.py",
         "orbits/test_newton.py",
     ),
