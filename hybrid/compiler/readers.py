@@ -8,7 +8,7 @@ import sympy
 
 from hybrid.compiler.written import Written
 from hybrid.kernels.types.codes import BY_FLOW, BY_GUARD, BY_NOTHING
-from hybrid.symbolic.nodes import mentions
+from hybrid.symbolic.nodes import mentions, nodes
 from hybrid.symbolic.tracing import Symbols
 from hybrid.system.graph import HybridSystem
 
@@ -60,7 +60,8 @@ def _symbols_in(functions: Iterable[Written], row: int | None = None) -> set[sym
         if each.expressions is None:
             return None
         for expression in each.expressions if row is None else each.expressions[row : row + 1]:
-            found |= expression.free_symbols
+            # Each node once: an expression may use its results many times over.
+            found |= {node for node in nodes(expression) if node.is_Symbol}
     return found
 
 
