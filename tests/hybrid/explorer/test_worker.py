@@ -79,7 +79,7 @@ def test_a_picture_moves_while_its_key_changes_fast(worker):
         time.sleep(0.01)
     assert worker.wait(10)
     keys = [each.job.key for each in worker.shown]
-    assert len(keys) >= 4
+    assert len(keys) >= 2
     assert keys == sorted(keys)
     assert keys[-1] == 19
 
