@@ -158,9 +158,8 @@ def gain_of_ratio(ratio):
 def misfit_of_limit(model, method, run, speed, span, shift, drowned, work):
     """What later jumps may still change the limit by, in units of the tolerances; the limit is followed.
 
-    ``speed`` is the guard's after the last jump, with its sign; ``shift`` is how far the jump has moved the
-    time of the limit. Where jumps are driven and not ``drowned`` in rounding, there is no limit to compare
-    with yet.
+    ``speed`` is the guard's after the last jump, with its sign; ``shift`` is the move of the limit's time.
+    Where jumps are driven and not ``drowned`` in rounding, there is no limit to compare with yet.
     """
     gain = gain_of_ratio(run.restitution)
     misfit = change_of_limit_time(model, method, run, gain, shift, span)

@@ -9,6 +9,7 @@ import sympy
 from hybrid.compiler import emit as module
 from hybrid.compiler.emit import emit
 from hybrid.compiler.propagators.equations import Boundary
+from hybrid.compiler.readers import is_free
 from hybrid.compiler.written import Written
 from hybrid.kernels.types.codes import EXACT, RUNGE_KUTTA, TAYLOR
 from hybrid.symbolic.expressions import Absolute, CubeRoot, Floor, Maximum, Sign
@@ -181,7 +182,7 @@ ZERO, ONE = sympy.Integer(0), sympy.Integer(1)
     [((Q,), (V,), True), ((Q, V), (V,), False), ((), (V,), True), (None, (V,), False)],
 )
 def test_what_is_free_of_symbols(expressions, symbols, free):
-    assert module._is_free(expressions, symbols) is free
+    assert is_free(expressions, symbols) is free
 
 
 @pytest.mark.parametrize(
