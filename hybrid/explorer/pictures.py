@@ -20,7 +20,7 @@ from hybrid.orbits.periodic_orbit import periodic_orbit
 from hybrid.orbits.sections import Section, poincare_section, stroboscopic_section
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
-from hybrid.status import Status
+from hybrid.status import Status, StatusCode
 from hybrid.sweep.attractors.basins import basins
 from hybrid.system.elements import Guard
 
@@ -115,22 +115,19 @@ def points_of(scene: Scene, taken: Section | HybridArc) -> Points:
     return Points(x, mode, last_jump.t, last_jump.x_plus, last_jump.target, taken.status)
 
 
-def arc_call(subject: Subject, scene: Scene, points: Points | None) -> Call:
+def arc_call(subject: Subject, scene: Scene, points: Points) -> Call:
     """The call that makes the arc of the portrait, from the start or from the end of the section."""
     system, shared = Written(subject.system, "system"), start_of(subject, scene)
     length = scene.window * subject.unit_of_time(scene.values)
-    if scene.part == BEGIN or points is None or points.mode_end is None:
+    if scene.part == BEGIN or points.mode_end is None:
         return Call("arc", simulate, (system, scene.x0, (0.0, length)), shared)
     t = points.t_end
-    if scene.section == JUMPS:
-        after = "run.jumps[-1]" if points.status.code.name == "MAX_JUMPS" else "run"
-        x_text, mode_text = (
-            ("run.jumps[-1].x_plus", "run.jumps[-1].target")
-            if after != "run"
-            else ("run.x[-1]", "run.mode[-1]")
-        )
-    else:
+    if scene.section != JUMPS:
         x_text, mode_text = "section.x[-1]", "section.mode[-1]"
+    elif points.status.code == StatusCode.MAX_JUMPS:
+        x_text, mode_text = "run.jumps[-1].x_plus", "run.jumps[-1].target"
+    else:
+        x_text, mode_text = "run.x[-1]", "run.mode[-1]"
     return Call(
         "arc",
         simulate,
@@ -186,8 +183,8 @@ def diagram_call(subject: Subject, scene: Scene) -> Call:
 def diagram_job(subject: Subject, scene: Scene) -> Job:
     """Columns of the diagram, first a few over the whole range, then those between them."""
     call = diagram_call(subject, scene)
-    system, _, x0 = call.arguments
-    values = np.linspace(scene.low, scene.high, scene.columns)
+    system, over, x0 = call.arguments
+    values = over[scene.over].value
 
     def some(part: np.ndarray) -> Callable[[], Any]:
         some_call = attrs.evolve(call, arguments=(system, {scene.over: values[part]}, x0))
