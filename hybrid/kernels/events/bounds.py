@@ -60,7 +60,7 @@ def _whole_line(row):
 
 
 @njit(**KERNEL)
-def _bound_state(path, column, middle, radius, row):
+def bound_state(path, column, middle, radius, row):
     """Bound a component of the path around ``middle`` by a parabola and its remainder.
 
     The remainder is at most ``radius**3`` times the sum of ``C(k, 3) |c_k| end**(k - 3)``.
@@ -96,7 +96,7 @@ def _bound_time(path, middle, radius, row):
     """Bound the time along the step."""
     start, pace = path.start, path.pace
     if path.clock >= 0:
-        _bound_state(path, path.clock, middle, radius, row)
+        bound_state(path, path.clock, middle, radius, row)
     else:
         value = pace * middle
         row[LOW], row[HIGH] = value - pace * radius, value + pace * radius
@@ -311,7 +311,7 @@ def bound_guard(programs, transition, path, middle, radius, registers):
         row = registers[place - first]
         code = programs.rows[place, 0]
         if code == op.STATE:
-            _bound_state(path, programs.rows[place, 1], middle, radius, row)
+            bound_state(path, programs.rows[place, 1], middle, radius, row)
         elif code == op.TIME:
             _bound_time(path, middle, radius, row)
         else:

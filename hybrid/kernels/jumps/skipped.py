@@ -4,7 +4,6 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.arithmetic.slopes import spread_of_rate
-from hybrid.kernels.events.crossings import Begin, first_change
 from hybrid.kernels.events.derivatives import speed_rounding
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
@@ -14,7 +13,8 @@ from hybrid.kernels.events.guards import (
     rounding_band,
     size_of_time,
 )
-from hybrid.kernels.events.sampled import NOWHERE
+from hybrid.kernels.guards.isolate import first_change
+from hybrid.kernels.guards.pieces import NO_COLUMN, NOWHERE, Guard
 from hybrid.kernels.jumps.rounds import fired_before, mark_endless
 from hybrid.kernels.types.codes import ENDLESS
 from hybrid.kernels.types.layout import EPSILON, Path
@@ -60,7 +60,8 @@ def way_is_free(model, method, run, turn, span, work):
             return False
         if has_program(model, other):
             way = Path(path, 1, -1, t, span, 1.0, True)
-            place, _, _ = first_change(model, method, run, other, way, Begin(side, 0, 0.0), work)
+            guard = Guard(other, NO_COLUMN, side, 0, 0.0, 0.0, 0.0)
+            place, _, _ = first_change(model, method, run, way, guard, 0.0, work)
             crossed = place != NOWHERE
         else:
             end = guard_value(model, other, t + span, work.settled, work.scalar)
