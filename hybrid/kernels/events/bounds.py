@@ -67,20 +67,21 @@ def bound_state(path, column, middle, radius, row):
     """
     end = middle + radius
     value, slope, bend = 0.0, 0.0, 0.0
-    size, third = 0.0, 0.0
+    size, steep, third = 0.0, 0.0, 0.0
     for k in range(path.degree, -1, -1):
         coefficient = path.powers[k, column]
         bend = bend * middle + slope
         slope = slope * middle + value
         value = value * middle + coefficient
         magnitude = abs(coefficient)
+        steep = steep * end + size
         size = size * end + magnitude
         if k > 2:
             third = third * end + magnitude * (k * (k - 1.0) * (k - 2.0) / 6.0)
     rounding = 4.0 * EPSILON * size
     row[LOW_MIDDLE], row[HIGH_MIDDLE] = value - rounding, value + rounding
     turn = 2.0 * abs(bend) * radius + 3.0 * third * radius * radius
-    turn += 4.0 * EPSILON * (abs(slope) + turn)
+    turn += 4.0 * EPSILON * (steep + turn)
     row[LEAST_SLOPE], row[MOST_SLOPE] = slope - turn, slope + turn
     rest = third * radius * radius * radius + rounding
     one, other = value + radius * (bend * radius - slope), value + radius * (bend * radius + slope)

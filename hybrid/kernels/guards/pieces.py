@@ -13,6 +13,7 @@ from hybrid.kernels.events.bounds import bound_state
 from hybrid.kernels.events.guards import guard_value
 from hybrid.kernels.events.onset import is_zero, side_is_certain
 from hybrid.kernels.events.path import state_at, time_at
+from hybrid.kernels.guards.touch import APART
 from hybrid.kernels.types.codes import (
     DESINGULARISED,
     HIGH,
@@ -285,9 +286,11 @@ def place_of_change(model, path, guard, low, high, work):
 def _turn_between(model, path, guard, low, high, work):
     """Where a guard comes closest to zero between two places; NOWHERE if it does not turn there.
 
-    A turn within rounding of the upper end counts as between them.
+    A turn next to the end of the path counts as on it: the next path may begin beyond the turn, by rounding.
     """
-    side = guard.side
+    side, end = guard.side, high
+    if high == path.length:
+        high *= 1.0 + APART
     at = bounds_at(model, path, guard, high, work)
     if not (at.most_slope if side > 0 else -at.least_slope) >= 0.0:
         return NOWHERE
@@ -303,7 +306,7 @@ def _turn_between(model, path, guard, low, high, work):
             low = place
         else:
             high = place
-    return 0.5 * (low + high)
+    return min(0.5 * (low + high), end)
 
 
 @njit(**INLINE)
