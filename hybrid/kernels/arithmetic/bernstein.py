@@ -1,22 +1,11 @@
-"""Real roots of a polynomial in Bernstein form by Descartes' rule: none missed, none counted twice.
-
-The number of sign variations of the Bernstein coefficients bounds the number of roots in the open interval
-and has the same parity (Lane and Riesenfeld 1981, doi:10.1007/BF01934081). So 0 or 1 variations prove 0 or 1
-roots, and an interval with more is halved. The hull of the coefficients makes "no root" cheap to prove, and
-nearly every step has no root.
-"""
+"""Polynomials in Bernstein form: their coefficients bound them, a cheap proof that a step has no root."""
 
 from numba import njit
 
 from hybrid.kernels.types.options import INLINE, KERNEL
 
+# Returned instead of a share of a step if there is none: beyond the end of every step.
 NO_ROOT = 2.0
-# Roots closer than this on the unit interval count as one root: rounding of the coefficients merges them.
-CLUSTER = 1e-14
-# A relative Newton step below this is in the range of quadratic convergence to a numerically simple root.
-SETTLED = 1e-8
-# A root closer to an end than this share of an interval may be one at the end itself, moved by rounding.
-AT_END = 1e-8
 
 
 @njit(**INLINE)
@@ -49,11 +38,7 @@ def stays(coefficients, degree, side, band):
 
 @njit(**KERNEL)
 def divide_by_theta(coefficients, degree):
-    """Divide, in place, a polynomial that vanishes at 0 by its variable; returns the new degree.
-
-    This removes a known root at the start of a step exactly: the root cannot be found again, nor hide a
-    second root near it.
-    """
+    """Divide, in place, a polynomial that vanishes at 0 by its variable; returns the new degree."""
     for i in range(degree):
         coefficients[i] = coefficients[i + 1] * degree / (i + 1)
     return degree - 1

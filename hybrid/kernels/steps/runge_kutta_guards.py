@@ -19,7 +19,6 @@ from hybrid.kernels.events.guards import (
     guard_speed,
     guard_value,
     rounding_band,
-    smooth_band,
 )
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP
 from hybrid.kernels.events.resolution import (
@@ -337,14 +336,6 @@ def searched_at(bracket, begins, distance, h):
 
 
 @njit(**KERNEL)
-def turns_back(model, run, transition, side, t, rates, work):
-    """Whether a guard leads back to its side at the end of the attempted step, within rounding of zero."""
-    speed = guard_speed(model, transition, t, work.new, rates, work.gradient)
-    value = guard_value(model, transition, t, work.new, work.scalar)
-    return speed * side > 0.0 and abs(value) <= smooth_band(model, run, transition, t, work.new, work)
-
-
-@njit(**KERNEL)
 def land(task, transition, side, h, theta):
     """Shorten the step so that it ends on the guard, with the end in ``work.new``.
 
@@ -385,11 +376,7 @@ def land(task, transition, side, h, theta):
         if closed and high - low <= 2.0 * EPSILON * (max(high, rounding) if smooth else high):
             if length != high:
                 attempt_again(task, high)
-            return (
-                NOT_THERE
-                if turns_back(model, run, transition, side, t + high, work.stages[s], work)
-                else high
-            ), 0.0
+            return high, 0.0
         newton = length + correction
         slow = trial >= MOST_LANDINGS // 2 if smooth else trial > 2 and not abs(correction) <= 0.5 * last
         # A place that does not come from Newton's method gives no rate of convergence.

@@ -106,7 +106,7 @@ def test_rounding_is_tried_in_both_directions():
 @pytest.mark.parametrize(("clock", "root"), [(3, 8), (5, 8), (7, 16)])
 def test_a_clock_stops_at_the_end_of_the_run(clock, root, remaining):
     """The clock shows ``s + s^2``; or ``2 s - s^2``, which turns at 1. Its root is in a column of its own."""
-    work = SimpleNamespace(polynomial=np.zeros(9), stack=np.zeros((60, 12)))
+    work = SimpleNamespace(registers=np.zeros((1, 6)))
     series = np.zeros((3, 24))
     series[:2, root] = 1.0, 0.0
     series[1:, clock] = 1.0, 1.0
