@@ -18,6 +18,7 @@ from hybrid.kernels.events.guards import (
     guard_acceleration,
     guard_speed,
     guard_value,
+    may_jump,
     rounding_band,
 )
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP
@@ -336,6 +337,16 @@ def searched_at(bracket, begins, distance, h):
 
 
 @njit(**KERNEL)
+def turns_back(model, run, transition, side, t, rates, work):
+    """Whether a guard that does not jump leads back to its side, within rounding of zero, where a step ends."""
+    speed = guard_speed(model, transition, t, work.new, rates, work.gradient)
+    if not speed * side > 0.0 or may_jump(model, run, transition, t, work.new, work):
+        return False
+    value = guard_value(model, transition, t, work.new, work.scalar)
+    return abs(value) <= rounding_band(model, run, transition, t, work.new, work)
+
+
+@njit(**KERNEL)
 def land(task, transition, side, h, theta):
     """Shorten the step so that it ends on the guard, with the end in ``work.new``.
 
@@ -376,7 +387,8 @@ def land(task, transition, side, h, theta):
         if closed and high - low <= 2.0 * EPSILON * (max(high, rounding) if smooth else high):
             if length != high:
                 attempt_again(task, high)
-            return high, 0.0
+            back = turns_back(model, run, transition, side, t + high, work.stages[s], work)
+            return (NOT_THERE if back else high), 0.0
         newton = length + correction
         slow = trial >= MOST_LANDINGS // 2 if smooth else trial > 2 and not abs(correction) <= 0.5 * last
         # A place that does not come from Newton's method gives no rate of convergence.

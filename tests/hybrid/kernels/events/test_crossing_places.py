@@ -1,14 +1,15 @@
 """What the search for a change of sign asks at one place, and between two places, on known guards."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from hybrid.kernels.events import crossings, pieces
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP
-from hybrid.kernels.events.sampled import NOWHERE
-from hybrid.kernels.types.codes import HIGH, HIGH_MIDDLE, LEAST_SLOPE, LOW, LOW_MIDDLE, MOST_SLOPE
+from hybrid.kernels.guards import isolate, pieces
+from hybrid.kernels.guards.pieces import NO_COLUMN, NOWHERE, Bounds
+from hybrid.kernels.types.codes import DESINGULARISED, EXACT, ROOTED, TAYLOR
 from hybrid.kernels.types.layout import EPSILON
 from tests.hybrid.kernels.events.curves import (
     ALONG,
@@ -25,19 +26,17 @@ kernels = plain(pieces)
 
 
 def known(side=1, *, on_guard=0, sure=0.0, base=0.0, tilt=0.0):
-    return pieces.Known(side, on_guard, sure, base, tilt)
+    return pieces.Guard(TRANSITION, NO_COLUMN, side, on_guard, sure, base, tilt)
 
 
 class TestRows:
     @pytest.mark.parametrize(("base", "tilt"), [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.25, -4.0)])
     def test_the_row_of_a_place(self, base, tilt):
         model, _, _, work = scene(polynomial(1.0, 3.0, noise=0.125))
-        assert kernels.row_at(model, TRANSITION, ALONG, 2.0, known(base=base, tilt=tilt), work) == 2
+        at = kernels.bounds_at(model, ALONG, known(base=base, tilt=tilt), 2.0, work)
         value = -1.0 - base - 2.0 * tilt
-        row = work.registers[2]
-        assert row[[LOW, HIGH]].tolist() == [value - 0.125, value + 0.125]
-        assert row[[LOW_MIDDLE, HIGH_MIDDLE]].tolist() == [value - 0.125, value + 0.125]
-        assert row[LEAST_SLOPE] == row[MOST_SLOPE] == pytest.approx(-tilt, abs=1e-15)
+        assert (at.low, at.high) == (at.low_middle, at.high_middle) == (value - 0.125, value + 0.125)
+        assert at.least_slope == at.most_slope == pytest.approx(-tilt, abs=1e-15)
 
     @pytest.mark.parametrize(
         ("slopes", "middle", "value"),
@@ -55,41 +54,37 @@ class TestRows:
     )
     def test_the_value_at_a_place(self, slopes, middle, value):
         model, _, _, work = scene(Curve(lambda place: 6.0 * place, None))
-        row = np.zeros(6)
-        row[[LEAST_SLOPE, MOST_SLOPE]], row[[LOW_MIDDLE, HIGH_MIDDLE]] = slopes, middle
-        assert kernels._value_at(model, TRANSITION, ALONG, 2.0, row, known(base=5.0, tilt=3.0), work) == value
+        at = Bounds(0.0, 0.0, *slopes, *middle)
+        assert kernels._value_at(model, ALONG, known(base=5.0, tilt=3.0), 2.0, at, work) == value
 
     def test_the_flattest_slope(self):
         for least, most, flattest in ((2.0, 5.0, 2.0), (-5.0, -2.0, -2.0), (2.0, math.inf, 2.0)):
-            row = np.zeros(6)
-            row[[LEAST_SLOPE, MOST_SLOPE]] = least, most
-            assert kernels._least_slope(row) == flattest
+            assert kernels._least_slope(Bounds(0.0, 0.0, least, most, 0.0, 0.0)) == flattest
         for least, most in ((-1.0, 1.0), (0.0, 1.0), (-1.0, 0.0), (-math.inf, math.inf)):
-            row[[LEAST_SLOPE, MOST_SLOPE]] = least, most
-            assert math.isnan(kernels._least_slope(row))
+            assert math.isnan(kernels._least_slope(Bounds(0.0, 0.0, least, most, 0.0, 0.0)))
 
     def test_signs_and_distances(self):
         model, _, _, work = scene(Curve(lambda place: place - 2.0, lambda place: 1.0, noise=0.5))
 
         def sign(place, base=0.0, tilt=0.0):
-            return kernels.certain_sign(model, TRANSITION, ALONG, place, known(base=base, tilt=tilt), work)
+            return kernels.certain_sign(model, ALONG, known(base=base, tilt=tilt), place, work)
 
         assert [sign(place) for place in (1.0, 1.5, 2.0, 2.5, 3.0)] == [-1, 0, 0, 0, 1]
         assert [sign(place, 1.0) for place in (2.0, 2.5, 3.0, 3.5, 4.0)] == [-1, 0, 0, 0, 1]
         assert [sign(place, -2.0, 2.0) for place in (-1.0, -0.5, 0.0, 0.5, 1.0)] == [1, 0, 0, 0, -1]
-        assert kernels.distance_at(model, TRANSITION, ALONG, 5.0, 1, work) == 2.5
-        assert kernels.distance_at(model, TRANSITION, ALONG, 5.0, -1, work) == -3.5
-        assert kernels.distance_at(model, TRANSITION, ALONG, -1.0, -1, work) == 2.5
+        assert kernels.distance_at(model, ALONG, known(1), 5.0, work) == 2.5
+        assert kernels.distance_at(model, ALONG, known(-1), 5.0, work) == -3.5
+        assert kernels.distance_at(model, ALONG, known(-1), -1.0, work) == 2.5
 
     def test_guards_without_a_value(self):
         ends = scene(Curve(lambda place: place, lambda place: 1.0, domain=(1.0, 2.0)))
         for place, has in ((0.5, False), (1.0, True), (1.5, True), (2.5, False)):
-            assert kernels._has_value(ends[0], TRANSITION, ALONG, place, ends[3]) == has
+            assert kernels._has_value(ends[0], ALONG, known(), place, ends[3]) == has
         for low, high in ((-math.inf, 3.0), (3.0, math.inf)):
             half = Curve(None, None)
             half.ranges = lambda *piece, low=low, high=high: (low, high, 0.0, 0.0, 0.0, 0.0)
             model, *_, work = scene(half)
-            assert kernels._has_value(model, TRANSITION, ALONG, 0.0, work)
+            assert kernels._has_value(model, ALONG, known(), 0.0, work)
 
     def test_a_guard_that_rests_at_zero(self):
         for value, least, most, rests in (
@@ -98,9 +93,7 @@ class TestRows:
             (0.0, -1.0, 0.0, False),
             (0.0, 0.0, 1.0, False),
         ):
-            row = np.zeros(6)
-            row[[LEAST_SLOPE, MOST_SLOPE]] = least, most
-            assert kernels._rests_at_zero(value, row) == rests
+            assert kernels._rests_at_zero(value, Bounds(0.0, 0.0, least, most, 0.0, 0.0)) == rests
 
     def test_a_known_part_is_subtracted_until_the_whole_guard_is_on_its_side(self):
         model, _, _, work = scene(Curve(lambda place: place - 2.0, lambda place: 1.0, noise=0.5))
@@ -112,17 +105,17 @@ class TestRows:
             (3.0, -1, True),
         ):
             found = kernels.known_at(
-                model, TRANSITION, ALONG, place, side, known(on_guard=BY_STEP, base=3.0, tilt=5.0), work
+                model, ALONG, known(on_guard=BY_STEP, base=3.0, tilt=5.0), place, side, work
             )
             parts = (3.0, 5.0) if hides else (0.0, 0.0)
-            assert found == (side, BY_STEP, place, *parts)
+            assert found[2:] == (side, BY_STEP, place, *parts)
 
 
 class TestRootInBracket:
     def root(self, curve, low, high, side, *, on_guard=0, base=0.0, tilt=0.0):
         model, _, _, work = scene(curve)
         before = known(side, on_guard=on_guard, sure=low, base=base, tilt=tilt)
-        place = kernels.place_of_change(model, TRANSITION, ALONG, low, high, before, work)
+        place = kernels.place_of_change(model, ALONG, before, low, high, work)
         assert all(low <= asked <= high and radius == 0.0 for asked, radius in curve.asked)
         assert len(curve.asked) <= 110
         return place
@@ -216,7 +209,7 @@ class TestTurnBetween:
     def turn(self, curve, low, high, side, *, base=0.0, tilt=0.0):
         model, _, _, work = scene(curve)
         return kernels._turn_between(
-            model, TRANSITION, ALONG, low, high, known(side, base=base, tilt=tilt), work
+            model, ALONG._replace(length=2.0 * high), known(side, base=base, tilt=tilt), low, high, work
         )
 
     @pytest.mark.parametrize("way", [1, -1])
@@ -260,9 +253,9 @@ def test_how_far_tolerances_move_a_guard_at_a_place():
     work.intervals[0] = 3.995, 4.005
     path = ALONG._replace(length=8.0, exact=False)
     for side, tolerated in ((1, 0.0), (-1, 4.0 * (0.5 + 0.25 * 8.0))):
-        piece = kernels.piece_of(model, TRANSITION, path, 0, known(side), work)._replace(turns=side < 0)
-        assert plain(crossings)._tolerated(model, method, run, TRANSITION, path, piece, work) == tolerated
-        assert plain(crossings)._tolerated(model, method, run, TRANSITION, ALONG, piece, work) == 0.0
+        piece = kernels.piece_of(model, path, known(side), 0, work)._replace(turns=side < 0)
+        assert plain(isolate)._tolerated(model, method, run, path, known(side), piece, work) == tolerated
+        assert plain(isolate)._tolerated(model, method, run, ALONG, known(side), piece, work) == 0.0
 
 
 @pytest.mark.parametrize("way", [1, -1])
@@ -285,7 +278,15 @@ def test_a_guard_that_a_jump_has_left_beyond_zero(way, value, slope, on_guard, r
         tilts=0.1,
     )
     model, _, run, work = scene(curve)
-    assert (
-        plain(crossings)._returns(model, run, TRANSITION, ALONG, known(way, on_guard=on_guard), work)
-        == returns
-    )
+    assert plain(isolate)._returns(model, run, ALONG, known(way, on_guard=on_guard), work) == returns
+
+
+@pytest.mark.parametrize(
+    ("kind", "root", "size"),
+    [(TAYLOR, 2, 64.0), (EXACT, 2, 64.0), (DESINGULARISED, 2, 8.0), (ROOTED, 2, 8.0), (ROOTED, 3, 4.0)],
+)
+def test_the_size_of_a_guard_in_its_column(kind, root, size):
+    model = SimpleNamespace(propagator=np.array([9, kind]), root=np.array([9, root]))
+    run = SimpleNamespace(mode=1)
+    assert kernels.as_column(model, run, known()._replace(column=3), 64.0) == pytest.approx(size, rel=1e-14)
+    assert kernels.as_column(model, run, known(), 64.0) == 64.0

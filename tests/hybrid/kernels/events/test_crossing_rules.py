@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT
-from hybrid.kernels.events import crossings
-from hybrid.kernels.events.crossings import MOST_PIECES, Begin
 from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, JUMPING
-from hybrid.kernels.events.sampled import NOWHERE
+from hybrid.kernels.guards import isolate
+from hybrid.kernels.guards.isolate import MOST_PIECES
+from hybrid.kernels.guards.pieces import NO_COLUMN, NOWHERE, Guard
+from hybrid.kernels.guards.touch import APART
 from hybrid.kernels.types.layout import EPSILON
 from tests.hybrid.kernels.events.curves import (
     ALONG,
@@ -24,7 +25,7 @@ from tests.hybrid.kernels.events.curves import (
 )
 from tests.hybrid.kernels.plain import plain
 
-kernels = plain(crossings)
+kernels = plain(isolate)
 
 
 class TestFirstChange:
@@ -33,10 +34,11 @@ class TestFirstChange:
         model, method, run, work = scene(curve, **others)
         on_guard = others.get("on_guard", 0)
         with np.errstate(invalid="ignore"):
-            path, begin = ALONG._replace(length=length, exact=exact), Begin(side, on_guard, hidden)
-            found = kernels.first_change(model, method, run, TRANSITION, path, begin, work)
+            path = ALONG._replace(length=length, exact=exact)
+            guard = Guard(TRANSITION, NO_COLUMN, side, on_guard, 0.0, 0.0, 0.0)
+            found = kernels.first_change(model, method, run, path, guard, hidden, work)
         assert all(
-            -EPSILON * length <= middle - radius and middle + radius <= length * (1.0 + EPSILON)
+            -EPSILON * length <= middle - radius and middle + radius <= length * (1.0 + 2.0 * APART)
             for middle, radius in curve.asked
         )
         return found, run
@@ -372,12 +374,13 @@ class TestCrossingOnPath:
         if not program:
             model.programs.first[:] = 0
         model.field = None
-        tested = plain(crossings, hidden_until=hidden_until).crossing_on_path
+        tested = plain(isolate, hidden_until=hidden_until).crossing_on_path
         path = ALONG._replace(length=length, exact=exact)
-        found = tested(model, method, run, TRANSITION, path, end, work)
+        theta, share = tested(model, method, run, TRANSITION, NO_COLUMN, path, end, work)
         if rests is not None:
-            assert given == [(model, method, run, TRANSITION, path, end, work)]
-        return found, run
+            ((*_, asked, _),) = given
+            assert asked == end
+        return (theta, run.rehearsal[3, TRANSITION], share), run
 
     @pytest.mark.parametrize("way", [1, -1])
     @pytest.mark.parametrize("program", [True, False])
@@ -431,8 +434,8 @@ class TestCrossingOnPath:
                 return -beside, beside, 0.0625
 
             model.field = field
-            tested = plain(crossings, signs_beside=signs_beside).crossing_on_path
-            found = tested(model, method, run, TRANSITION, ALONG._replace(length=2.0), 0.0, work)
+            tested = plain(isolate, signs_beside=signs_beside).crossing_on_path
+            found = tested(model, method, run, TRANSITION, NO_COLUMN, ALONG._replace(length=2.0), 0.0, work)
             assert len(asked) == (fired == TRANSITION)
             if fired == TRANSITION:
                 assert found[0] == approx(expected, 4.0)

@@ -6,12 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hybrid.kernels.events import hidden
+from hybrid.kernels.guards import hidden
+from hybrid.kernels.guards.pieces import NO_COLUMN, Guard
 from hybrid.kernels.types.codes import HIGH, LOW
 from hybrid.kernels.types.layout import EPSILON, Path
 from tests.hybrid.kernels.plain import plain
 
 kernels = plain(hidden)
+GUARD = Guard(1, NO_COLUMN, 1, 0, 0.0, 0.0, 0.0)
 # One component, which is the place itself: time is 10 plus half of the place.
 PATH, CLOCK, START, PACE = np.array([[0.0], [1.0]]), -1, 10.0, 0.5
 ALONG = Path(PATH, 1, CLOCK, START, PACE, 1.0, True)
@@ -38,6 +40,7 @@ def opaque(guard):
         dimension=1,
         parameters=np.zeros(0),
         programs=SimpleNamespace(first=np.array([0, 3, 3, 5])),
+        propagator=np.zeros(1),
         guard=write,
         guard_gradient=gradient,
     )
@@ -49,6 +52,7 @@ def bounded(low, high):
     def bound(programs, program, path, middle, radius, registers):
         assert (program, path is ALONG) == (1, True)
         assert middle == radius
+        registers[2] = 0.0
         registers[2, LOW], registers[2, HIGH] = low(2.0 * middle), high(2.0 * middle)
         return 2
 
@@ -63,7 +67,7 @@ def test_a_sample_is_the_guard_at_its_place_and_time():
 
 class TestFarthestFromZero:
     def far(self, model, place=2.0):
-        return kernels.farthest_from_zero(model, 1, ALONG, place, memory())
+        return kernels.farthest_from_zero(model, ALONG, GUARD, place, memory())
 
     @pytest.mark.parametrize(("low", "high", "far"), [(-3.0, 2.0, 3.0), (-0.25, 0.5, 0.5), (1.0, 4.0, 4.0)])
     def test_is_the_farther_bound(self, low, high, far):
@@ -88,13 +92,6 @@ class TestFarthestFromZero:
         assert self.far(model) == math.inf
 
 
-@pytest.mark.parametrize(
-    ("end", "noise"), [(0.5, 1.0 + 2.0), (-5.0, 1.0 + 5.0), (1e3, 1.0 + 200.0), (-1e3, 1.0 + 200.0)]
-)
-def test_the_noise_of_signs(end, noise):
-    assert kernels.noise_of_signs(1.0, 2.0, end) == noise
-
-
 class TestHiddenUntil:
     """The guard is the third power of the place, so that each halving makes it eight times smaller."""
 
@@ -103,10 +100,9 @@ class TestHiddenUntil:
             hidden, may_jump=lambda *given: jumps, rounding_band=lambda *given: rounding
         ).hidden_until
         method = SimpleNamespace(atol=1e-3, rtol=0.25)
-        run = SimpleNamespace(y=np.array([3.0]), scale=np.array([0.5]))
-        return tested(
-            opaque(guard), method, run, 1, ALONG._replace(length=length, exact=exact), end, memory()
-        )
+        run = SimpleNamespace(mode=0, y=np.array([3.0]), scale=np.array([0.5]))
+        path = ALONG._replace(length=length, exact=exact)
+        return tested(opaque(guard), method, run, path, GUARD, end, memory())
 
     def test_ends_where_the_guard_is_farther_from_zero_than_rounding(self):
         assert self.until(rounding=1e-6) == (2.0**-7, False)
@@ -145,40 +141,3 @@ class TestHiddenUntil:
 
     def test_ends_somewhere_for_a_guard_that_stays_far_from_zero(self):
         assert self.until(lambda t, x: 1.0) == (2.0**-50, False)
-
-
-class TestHiddenShare:
-    """The same for polynomials, with their coefficients on the rest of the step."""
-
-    def share(self, coefficients, rounding, error=0.0, end=None):
-        coefficients = np.array([*coefficients, 77.0])
-        degree = len(coefficients) - 2
-        end = coefficients[degree] if end is None else end
-        stack = np.full((2, degree + 3), 55.0)
-        share = kernels.hidden_share(coefficients, degree, rounding, error, end, stack)
-        assert coefficients[-1] == 77.0
-        return share, coefficients[:-1].tolist()
-
-    @pytest.mark.parametrize("sign", [1.0, -1.0])
-    def test_of_a_third_power(self, sign):
-        rest = sign * np.array([1 / 64, 1 / 16, 1 / 4, 1.0])
-        assert self.share([0.0, 0.0, 0.0, sign], 1 / 64) == (0.25, rest.tolist())
-        assert self.share([0.0, 0.0, 0.0, sign], 1 / 65)[0] == 0.125
-
-    def test_of_a_polynomial_that_turns(self):
-        """``s - s**2``, of which a quarter of the step is less than a quarter."""
-        assert self.share([0.0, 0.5, 0.0], 0.25) == (0.5, [0.25, 0.25, 0.0])
-        assert self.share([0.0, 0.5, 0.0], 0.5) == (1.0, [0.0, 0.0, 0.0])
-
-    def test_the_end_is_known_better_than_the_polynomial(self):
-        assert self.share([0.0, 0.0, 0.0, 1.0], 1 / 64, end=4.0) == (0.125, [1 / 128, 1 / 16, 0.5, 4.0])
-
-    def test_counts_the_error_of_the_method(self):
-        # Noise is the rounding and the value at the end, between the error and a hundred of it.
-        assert self.share([0.0, 0.0, 0.0, 1.0], 0.1, error=0.025)[0] == 1.0
-        assert self.share([0.0, 0.0, 0.0, 1.0], 0.1, error=0.0009)[0] == 0.5
-        assert self.share([0.0, 0.0, 0.1], 0.0, error=0.025)[0] == 1.0
-        assert self.share([0.0, 0.8, 0.1], 0.0, error=0.4)[0] == 0.25
-
-    def test_ends_somewhere_for_a_polynomial_that_is_not_zero_at_the_start(self):
-        assert self.share([1.0, 1.0], 0.5)[0] == 2.0**-50

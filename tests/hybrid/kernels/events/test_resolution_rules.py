@@ -55,25 +55,6 @@ class TestKept:
         kernels.keep_crossing(run, 1, 0.5, way)
         assert run.passed[1] == 0.375
 
-    @BOTH
-    def test_a_guard_that_starts_on_the_side_to_which_it_crosses_passes_zero_before(self, way):
-        """``(s - 1/4) (s - 3/4)``, on the step beyond a share of 1/5."""
-        coefficients = way * np.array([0.1875, -0.3125, 0.1875])
-
-        def passed(direction, side, hidden=0.0):
-            run = run_at_guards(None, [way])
-            kernels.keep_passage(run, 1, direction, coefficients, 2, side, hidden, np.zeros((40, 8)))
-            return run.passed[1]
-
-        assert passed(way, way) == pytest.approx(0.25, rel=1e-14)
-        assert passed(way, 0) == pytest.approx(0.25, rel=1e-14)
-        assert passed(way, way, hidden=0.2) == pytest.approx(0.2 + 0.25 * 0.8, rel=1e-14)
-        # No passage is noted for any direction, from the other side, or without a root.
-        assert passed(0, way) == 88.0
-        assert passed(way, -way) == 88.0
-        coefficients[:] = way, way, way
-        assert passed(way, way) == 88.0
-
     def test_sides_before_an_event_nearer_to_the_first_change_than_to_the_crossing(self):
         def sides(earliest, passed):
             run = run_at_guards(None, [1, 1])

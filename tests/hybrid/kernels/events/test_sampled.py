@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from hybrid import Guard, HybridSystem, Mode, Taylor, Transition, simulate
-from hybrid.kernels.events import hidden, sampled
-from hybrid.kernels.events.crossings import Begin
 from hybrid.kernels.events.onset import BY_SPEED, BY_STEP
-from hybrid.kernels.events.sampled import NOWHERE, SAMPLES
+from hybrid.kernels.guards import hidden, sampled
+from hybrid.kernels.guards.pieces import NO_COLUMN, NOWHERE
+from hybrid.kernels.guards.pieces import Guard as OnPath
+from hybrid.kernels.guards.sampled import SAMPLES
 from hybrid.kernels.types.layout import Path
 from tests.hybrid.kernels.plain import plain
 
@@ -56,7 +57,8 @@ class TestAlongAPath:
         run = SimpleNamespace(unproved=4, last_fired=1 if fired else 0, since_entry=0.0, passed=np.zeros(2))
         work = SimpleNamespace(state=np.zeros(1), scalar=np.zeros(1))
         path = Path(np.array([[-1.0], [1.0]]), 1, -1, 10.0, 0.5, length, True)
-        found = plain(sampled).sampled_change(model, run, 1, path, Begin(side, on_guard, hidden), work)
+        known = OnPath(1, NO_COLUMN, side, on_guard, 0.0, 0.0, 0.0)
+        found = plain(sampled).sampled_change(model, run, path, known, hidden, work)
         assert run.unproved == 5
         return found
 
@@ -112,7 +114,7 @@ def test_how_far_a_guard_comes_from_zero_at_eight_places():
         work = SimpleNamespace(state=np.zeros(1), scalar=np.zeros(1))
         kernels = plain(hidden, has_program=lambda *arguments: False)
         path = Path(np.array([[-1.0], [1.0]]), 1, -1, 10.0, 0.5, 2.0, True)
-        return kernels.farthest_from_zero(model, 1, path, place, work)
+        return kernels.farthest_from_zero(model, path, OnPath(1, NO_COLUMN, 1, 0, 0.0, 0.0, 0.0), place, work)
 
     for place in np.arange(1, 9) / 4:
         for value in (0.5, -0.5):

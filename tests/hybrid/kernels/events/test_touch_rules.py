@@ -1,28 +1,16 @@
-"""Touches of guards that are polynomials on a step, rule by rule."""
+"""Touches of guards on a step, rule by rule."""
 
-import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT
-from hybrid.kernels.events import guards, touches
-from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.events import guards
+from hybrid.kernels.guards import touch
 from tests.hybrid.kernels.plain import plain
 
-kernels = plain(touches)
-DEGREE = 6
-BOTH = pytest.mark.parametrize("way", [1.0, -1.0])
-
-
-def bernstein(*roots, factor=1.0, rest=0.0):
-    """Bernstein coefficients of ``factor * (product of (s - root) + rest)``."""
-    powers = np.zeros(DEGREE + 1)
-    powers[: len(roots) + 1] = np.polynomial.Polynomial.fromroots(roots).coef
-    powers[0] += rest
-    shares = [[math.comb(i, k) / math.comb(DEGREE, k) for k in range(i + 1)] for i in range(DEGREE + 1)]
-    return [factor * sum(a * b for a, b in zip(share, powers, strict=False)) for share in shares]
+kernels = plain(touch)
 
 
 class TestNote:
@@ -55,146 +43,6 @@ class TestNote:
         assert self.run.grazing_guard == 0
 
 
-class TestTurnAtEnd:
-    """Polynomials of degree two and three by their differences at the end of the step."""
-
-    def kind(self, *coefficients, rounding=1e-9):
-        # Rows are no longer than they must be.
-        stack = np.full((4, len(coefficients) + 2), 88.0)
-        given = np.array([*coefficients, 77.0])
-        found = kernels.turn_at_end(given, len(coefficients) - 1, rounding, stack)
-        assert given.tolist() == [*coefficients, 77.0]
-        return found
-
-    @BOTH
-    def test_the_first_derivative_that_is_not_zero_tells(self, way):
-        assert self.kind(way, 0.5 * way, 0.0) == 0
-        assert self.kind(way, 0.0, 0.0) == way
-        assert self.kind(way, 0.0, 0.0, 0.0) == 0
-        assert self.kind(way, 0.0, 0.0, 0.0, 0.0) == way
-        assert self.kind(3.0, 3.0, 3.0) == 0
-        assert self.kind(3.0, 3.0, 3.0, 3.0) == 0
-        assert self.kind(5.0) == 0
-        # The second difference of the last three is 3 - 2 * 2 + 2.
-        assert self.kind(9.0 * way, 3.0 * way, 2.0 * way, 2.0 * way) == way
-
-    @BOTH
-    def test_the_rounding_of_differences_doubles_with_their_order(self, way):
-        assert self.kind(way, 2.01e-9 * way, 0.0) == 0
-        assert self.kind(way, 1.99e-9 * way, 0.0) == way
-        assert self.kind(4.01e-9 * way, 0.0, 0.0) == way
-        assert self.kind(3.99e-9 * way, 0.0, 0.0) == 0
-
-
-class TestNoteTouches:
-    def touches(self, polynomial, *, known=0, start=0.0, theta=NO_ROOT, band=1e-5):
-        found = []
-        tested = plain(touches, note_touch=lambda run, transition, *touch: found.append(touch))
-        stack = np.full((80, 40), 88.0)
-        work = SimpleNamespace(polynomial=np.full(40, 88.0), stack=stack)
-        work.polynomial[: len(polynomial)] = polynomial
-        # The search for roots divides zero by zero where both ends of an interval are roots.
-        with np.errstate(invalid="ignore"):
-            tested.note_touches("run", 5, len(polynomial) - 1, known, start, theta, band, work)
-        return found
-
-    def at(self, place, value):
-        return pytest.approx(place, abs=1e-7), pytest.approx(value, rel=1e-6, abs=1e-15)
-
-    @BOTH
-    def test_a_turn_within_the_band(self, way):
-        bottom = bernstein(0.4, 0.4, factor=way, rest=1e-6)
-        assert self.touches(bottom, band=1.01e-6) == [self.at(0.4, way * 1e-6)]
-        assert self.touches(bottom, band=0.99e-6) == []
-        # A dip through zero holds two crossings, whether they fire or not.
-        assert self.touches(bernstein(0.4, 0.4, factor=way, rest=-1e-6)) == []
-
-    @BOTH
-    @pytest.mark.parametrize("place", [0.4, 0.6])
-    def test_a_turn_may_lie_beyond_zero_by_rounding(self, place, way):
-        """The largest coefficient, at one end or the other, is 0.36: rounding is 5.8 EPSILON."""
-        for units, count in ((-4.0, 1), (-8.0, 0)):
-            bottom = bernstein(place, place, factor=way, rest=units * EPSILON)
-            assert len(self.touches(bottom)) == count
-
-    @BOTH
-    def test_only_turns_between_the_start_and_the_crossing(self, way):
-        bottom = bernstein(0.4, 0.4, factor=way, rest=1e-6)
-        assert self.touches(bottom, start=0.3) == [self.at(0.4, way * 1e-6)]
-        assert self.touches(bottom, start=0.5) == []
-        crossing = bernstein(0.4, 0.4, 0.7, factor=-way)
-        assert self.touches(crossing, theta=0.7) == [self.at(0.4, 0.0)]
-        assert self.touches(crossing, theta=0.3) == []
-
-    @BOTH
-    def test_the_start_of_a_step_belongs_to_the_step_before(self, way):
-        assert self.touches(bernstein(0.0, 0.0, factor=way, rest=1e-6)) == []
-
-    @BOTH
-    def test_the_bottom_of_a_dip_at_which_the_guard_crosses_is_none(self, way):
-        crossing = bernstein(0.4, 0.4, 0.7, factor=-way)
-        assert self.touches(crossing, theta=0.4 + 1e-9) == []
-
-    @BOTH
-    def test_several_in_their_order(self, way):
-        twice = bernstein(0.25, 0.25, 0.75, 0.75, factor=way)
-        found = [self.at(0.25, 0.0), self.at(0.75, 0.0)]
-        assert self.touches(twice) == found
-        assert self.touches(twice, start=0.5) == found[1:]
-        assert self.touches(twice, theta=0.6) == found[:1]
-        # The top between both is no touch, unless it is within the band: the turns are then all touches.
-        assert self.touches(twice, band=2.0**-8) == [found[0], found[1]]
-
-    @BOTH
-    def test_turns_that_only_rounding_parts_are_one(self, way):
-        for level in (0.0, 1e-6):
-            flat = bernstein(0.4, 0.4, 0.4002, 0.4002, factor=way, rest=level)
-            ((place, value),) = self.touches(flat)
-            assert place == pytest.approx(0.4, abs=1e-3)
-            assert value == pytest.approx(way * level, abs=1e-15)
-
-    @BOTH
-    def test_roots_at_the_start_are_put_back(self, way):
-        """The guard is the given polynomial times ``s**known``, with a touch at 1/2."""
-        for known in (1, 2):
-            quotient = np.array([0.25, -0.25, 0.25]) * way
-            assert self.touches(quotient, known=known) == [self.at(0.5, 0.0)]
-        shifted = np.array([0.25, -0.25, 0.25]) * way + 1e-7 * way
-        ((_, value),) = self.touches(shifted, known=1)
-        assert value == pytest.approx(0.5e-7 * way, rel=1e-5)
-
-    @BOTH
-    def test_a_turn_at_the_end(self, way):
-        ended = bernstein(1.0, 1.0, factor=way, rest=1e-6)
-        assert self.touches(ended, band=1.01e-6)[-1] == (1.0, pytest.approx(way * 1e-6, rel=1e-9))
-        assert self.touches(ended, band=0.99e-6) == []
-        assert self.touches(ended, theta=1.0) == []
-        assert self.touches(bernstein(1.0, 1.0, factor=way, rest=-1e-6)) == []
-        # A guard that ends near zero and moves on does not turn there, nor does one with a flat root.
-        assert self.touches(bernstein(1.0, factor=way, rest=1e-6)) == []
-        assert self.touches(bernstein(1.0, 1.0, 1.0, factor=way)) == []
-
-    @BOTH
-    def test_a_turn_that_the_end_follows_at_once(self, way):
-        """Up to the end the guard rises by less than rounding, but it does not cross."""
-        ((place, value),) = self.touches(bernstein(1.0 - 1e-9, 1.0 - 1e-9, factor=way, rest=1e-6))
-        assert place == pytest.approx(1.0 - 1e-9, abs=1e-12)
-        assert value == pytest.approx(way * 1e-6, rel=1e-9)
-
-    @BOTH
-    @pytest.mark.parametrize("size", [2.0**-20, 1.0, 2.0**20])
-    def test_a_turn_at_the_end_may_lie_beyond_zero_by_rounding(self, size, way):
-        """That is 16 units in the last place of the largest coefficient."""
-        for units, expected in ((-15.0, True), (-17.0, False)):
-            last = units * EPSILON * size * way
-            ended = bernstein(1.0, 1.0, factor=way * size)
-            ended[0], ended[-2:] = way * size, [last, last]
-            found = self.touches(ended, band=1e-5 * size)
-            assert bool(found) == expected
-            if expected:
-                assert found[-1] == (1.0, last)
-
-
 class TestRemember:
     """The 9th step of a run, two of which were rejected, touches the guard of transition 4."""
 
@@ -211,7 +59,7 @@ class TestRemember:
         run = SimpleNamespace(grazing_guard=4, steps=9, rejected=2, grazing_value=0.25)
         run.touched_step, run.touched_guard = before
         work = SimpleNamespace(state="state", scalar=None)
-        tested = plain(touches, keep_grazing=keep_grazing, allowed=allowed)
+        tested = plain(touch, keep_grazing=keep_grazing, allowed=allowed)
         tested.remember_touch("model", run, "record", place, 7.5, work)
         self.last = run.touched_step, run.touched_guard
         assert kept in ([], [("record", 4, 7.5, "state", 0.25)])

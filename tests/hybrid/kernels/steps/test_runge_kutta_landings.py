@@ -61,7 +61,10 @@ class Landing:
             parameters=None,
         )
         tested = plain(
-            runge_kutta_guards, attempt_again=attempt_again, measured_time=lambda *given: np.float64(rounding)
+            runge_kutta_guards,
+            attempt_again=attempt_again,
+            measured_time=lambda *given: np.float64(rounding),
+            turns_back=lambda *given: False,
         )
         method, run = SimpleNamespace(b=np.zeros(1)), SimpleNamespace(mode=5, phase=self.T, y=np.array([0.0]))
         task = SimpleNamespace(

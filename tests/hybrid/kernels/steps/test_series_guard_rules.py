@@ -1,14 +1,10 @@
 """Guards along a series, rule by rule, on polynomials whose roots are known."""
 
-from types import SimpleNamespace
-
 import numpy as np
-import pytest
 
 from hybrid.kernels.events.resolution import UNDERFLOW
 from hybrid.kernels.steps import series_guards
 from hybrid.kernels.steps.series_guards import TAIL_OF_GUARD
-from hybrid.kernels.types.codes import DESINGULARISED, EXACT, ROOTED, TAYLOR
 from tests.hybrid.kernels.plain import plain
 
 kernels = plain(series_guards)
@@ -17,15 +13,6 @@ kernels = plain(series_guards)
 def column(*powers):
     """A series in the second of two columns."""
     return np.column_stack([np.full(len(powers), 77.0), powers])
-
-
-@pytest.mark.parametrize(
-    ("kind", "root", "size"),
-    [(TAYLOR, 2, 64.0), (EXACT, 2, 64.0), (DESINGULARISED, 2, 8.0), (ROOTED, 2, 8.0), (ROOTED, 3, 4.0)],
-)
-def test_the_size_of_a_guard_in_its_series(kind, root, size):
-    model = SimpleNamespace(propagator=np.array([9, kind]), root=np.array([9, root]))
-    assert kernels.as_root(model, 1, 64.0) == pytest.approx(size, rel=1e-14)
 
 
 def test_the_last_terms():
