@@ -101,7 +101,8 @@ NEAREST = {
         "kernels/events/test_proved_crossings.py",
         "kernels/events/test_crossings.py",
     ),
-    "hybrid/kernels/events/crossings.py": (
+    "hybrid/kernels/guards/isolate.py": (
+        "kernels/events/test_polynomials.py",
         "kernels/events/test_crossing_places.py",
         "kernels/events/test_crossing_rules.py",
         "kernels/events/test_crossings.py",
@@ -129,7 +130,7 @@ NEAREST = {
         "kernels/jumps/test_instant_rules.py",
         "kernels/events/test_crossings.py",
     ),
-    "hybrid/kernels/events/hidden.py": ("kernels/events/test_sampled.py", "kernels/events/test_lift_off.py"),
+    "hybrid/kernels/guards/hidden.py": ("kernels/events/test_sampled.py", "kernels/events/test_lift_off.py"),
     "hybrid/kernels/events/initial_mode.py": (
         "simulation/test_simulate.py",
         "kernels/jumps/test_instant.py",
@@ -151,7 +152,7 @@ NEAREST = {
         "kernels/events/test_resolution_rules.py",
         "kernels/events/test_touches.py",
     ),
-    "hybrid/kernels/events/sampled.py": (
+    "hybrid/kernels/guards/sampled.py": (
         "kernels/events/test_forms.py",
         "kernels/events/test_jumps_and_gaps.py",
         "kernels/events/test_domain.py",
@@ -166,7 +167,7 @@ NEAREST = {
         "kernels/events/test_curvature.py",
     ),
     "hybrid/kernels/events/sections.py": ("orbits/test_sections.py",),
-    "hybrid/kernels/events/touches.py": (
+    "hybrid/kernels/guards/touch.py": (
         "kernels/events/test_touch_rules.py",
         "kernels/events/test_grazing.py",
     ),

@@ -338,7 +338,7 @@ def searched_at(bracket, begins, distance, h):
 
 @njit(**KERNEL)
 def turns_back(model, run, transition, side, t, rates, work):
-    """Whether a guard that does not jump leads back to its side, within rounding of zero, where a step ends."""
+    """Whether a guard that does not jump leads back to its side, where a step ends within its rounding."""
     speed = guard_speed(model, transition, t, work.new, rates, work.gradient)
     if not speed * side > 0.0 or may_jump(model, run, transition, t, work.new, work):
         return False
