@@ -1,7 +1,7 @@
 """Counts crossings missed or doubled at random near-double roots, and measures errors of event times.
 
-``python -m benchmarks.events --runs 2000`` runs that many polynomial motions with known roots with each of the
-library's solvers and with SciPy.
+``python -m benchmarks.events --runs 2000`` runs that many polynomial motions with known roots with each solver
+of the library and with SciPy.
 """
 
 from __future__ import annotations

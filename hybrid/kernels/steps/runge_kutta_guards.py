@@ -337,9 +337,9 @@ def searched_at(bracket, begins, distance, h):
 
 
 @njit(**KERNEL)
-def turns_back(model, run, transition, side, t, rates, work):
+def turns_back(model, run, transition, side, t, s, work):
     """Whether a guard that does not jump leads back to its side, where a step ends within its rounding."""
-    speed = guard_speed(model, transition, t, work.new, rates, work.gradient)
+    speed = guard_speed(model, transition, t, work.new, work.stages[s], work.gradient)
     if not speed * side > 0.0 or may_jump(model, run, transition, t, work.new, work):
         return False
     value = guard_value(model, transition, t, work.new, work.scalar)
@@ -387,8 +387,7 @@ def land(task, transition, side, h, theta):
         if closed and high - low <= 2.0 * EPSILON * (max(high, rounding) if smooth else high):
             if length != high:
                 attempt_again(task, high)
-            back = turns_back(model, run, transition, side, t + high, work.stages[s], work)
-            return (NOT_THERE if back else high), 0.0
+            return (NOT_THERE if turns_back(model, run, transition, side, t + high, s, work) else high), 0.0
         newton = length + correction
         slow = trial >= MOST_LANDINGS // 2 if smooth else trial > 2 and not abs(correction) <= 0.5 * last
         # A place that does not come from Newton's method gives no rate of convergence.
