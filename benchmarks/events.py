@@ -1,6 +1,6 @@
 """Counts crossings missed or doubled at random near-double roots, and measures errors of event times.
 
-``python -m benchmarks.events --runs 2000`` runs that many polynomial motions with known roots with each solver
+``python -m benchmarks.events --runs 2000`` runs that many motions with known roots, with each solver
 of the library and with SciPy.
 """
 

@@ -48,7 +48,7 @@ def test_a_workspace(shapes, solver, stages, degree, coupled, order, nodes, plac
         **dict.fromkeys(("field", "field_after", "state", "settled", "departure", "scale_before"), (N,)),
         **dict.fromkeys(("saltation", "sizes"), (N, N)),
         "rounding": (4, N),
-        "path": (degree + 1, N),
+        "path": (degree + 1, N + 1),
         "polynomial": (width,),
         "stack": (64, width),
         "intervals": (64, 2),

@@ -85,7 +85,6 @@ def test_the_kernels_view_of_a_solver():
 # What a run may need, and the parts that are handed over for it.
 PARTS = {
     "forced": ("explained_step", "explained_attempt", "explained_series"),
-    "beside_series": ("crossing_beside_series",),
     "tangents": ("keep_apart",),
     "abrupt": ("look_back",),
     "timed": ("late_step", "late_jump"),
@@ -106,22 +105,18 @@ def test_what_a_run_does_not_need_is_not_loaded(need, steps):
 
 
 def test_parts_that_a_run_needs():
-    """By guards with a series and without one, and by fields that may change abruptly."""
+    """By tangent vectors, by fields that may change abruptly, and by what depends on time."""
 
-    def parts_of(field, guard, tangents, reset=None, other=None):
-        guards = [guard] if other is None else [guard, other]
+    def parts_of(field, guard, tangents, reset=None):
         system = hybrid.HybridSystem(
             state=("q", "v"),
             modes=[hybrid.Mode("move", field)],
             transitions=[
-                hybrid.Transition(
-                    "move", "move", hybrid.Guard(each), reset and hybrid.Reset(reset), name=f"{k}"
-                )
-                for k, each in enumerate(guards)
+                hybrid.Transition("move", "move", hybrid.Guard(guard), reset and hybrid.Reset(reset))
             ],
         )
         made = plan.plan_of(hybrid.compile_system(system), hybrid.Taylor(), tangents)
-        parts = made.parts.keep_apart, made.parts.look_back, made.task.attempts.crossing_beside_series
+        parts = made.parts.keep_apart, made.parts.look_back
         late = {made.parts.late_step.address != 0, made.parts.late_jump.address != 0}
         return *(each.address != 0 for each in parts), *late
 
@@ -134,17 +129,13 @@ def test_parts_that_a_run_needs():
     def level(t, x, p):
         return x.q - 0.5
 
-    assert parts_of(smooth, level, 0) == (False, False, False, False)
-    assert parts_of(smooth, lambda t, x, p: np.exp(x.q) - 2.0, 0) == (False, False, True, False)
-    # One of two guards without a series is enough.
-    both = parts_of(smooth, level, 0, other=lambda t, x, p: np.exp(x.q) - 2.0)
-    assert both == (False, False, True, False)
-    assert parts_of(smooth, level, 2) == (True, False, False, False)
-    assert parts_of(steep, level, 0) == (False, False, False, False)
-    assert parts_of(steep, level, 2) == (True, True, False, False)
-    assert parts_of(smooth, lambda t, x, p: x.q - t, 0) == (False, False, False, True)
-    assert parts_of(lambda t, x, p: (x.v, t), level, 0) == (False, False, False, True)
-    assert parts_of(smooth, level, 0, lambda t, x, p: (x.q, t)) == (False, False, False, True)
+    assert parts_of(smooth, level, 0) == (False, False, False)
+    assert parts_of(smooth, level, 2) == (True, False, False)
+    assert parts_of(steep, level, 0) == (False, False, False)
+    assert parts_of(steep, level, 2) == (True, True, False)
+    assert parts_of(smooth, lambda t, x, p: x.q - t, 0) == (False, False, True)
+    assert parts_of(lambda t, x, p: (x.v, t), level, 0) == (False, False, True)
+    assert parts_of(smooth, level, 0, lambda t, x, p: (x.q, t)) == (False, False, True)
 
 
 def test_plans_of_the_last_solvers_are_kept(compiled):
