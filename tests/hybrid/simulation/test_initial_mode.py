@@ -8,8 +8,8 @@ import pytest
 
 from hybrid import ArgumentError, Guard, HybridSystem, Mode, Reset, Transition, from_equations, simulate
 
-# At ``q = 0`` with ``q' = 1`` the guard of a transition with this place is crossed, is crossed at once, is still
-# ahead, or has no value.
+# At ``q = 0`` with ``q' = 1`` the guard of a transition with this place is crossed, crosses at once,
+# is ahead, or has no value.
 BEYOND, LEAVES, AHEAD, UNDEFINED = -1.0, 0.0, 1.0, 3.0
 
 
