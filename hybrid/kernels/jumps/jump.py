@@ -153,9 +153,9 @@ def carry_tangents(model, run, tangents, orthonormal, apart, work):
 
 @njit(**INLINE)
 def ends_own_flight(model, run, transition, transversality):
-    """Whether an impact ends the flight that the last one began, at least half as fast: a low bounce is no grazing.
+    """Whether an impact ends the flight that the last one began, at least half as fast.
 
-    All orbits nearby hit the guard too, because the pull leads them back to it.
+    A low bounce is no grazing: all orbits nearby hit the guard too, because the pull leads them back to it.
     """
     bounces = run.chattering > 0 and run.chatter_jumps == run.jumps and run.last_fired == transition
     return bounces and 2.0 * abs(transversality) >= run.trail[IMPULSE, model.dimension]

@@ -11,8 +11,8 @@ from hybrid.kernels.types.options import KERNEL
 # Share of a component's size over which a central difference is taken: the cube root of EPSILON makes its
 # errors by rounding and by curvature alike, about EPSILON to the power 2/3.
 NEARBY = EPSILON ** (1.0 / 3.0)
-# Share of the terms of an entry below which the entry is their rounding, which would look like a direction.
-CANCELLED = 512.0 * EPSILON
+# Share of a number, or of the terms of a sum, that rounding may make up after a few operations.
+ROUNDED = 64.0 * EPSILON
 
 
 @njit(**KERNEL)
@@ -69,4 +69,5 @@ def rest_matrix(model, run, transition, work):
             taken = impulse[i] * (slope[j] - coupling * work.gradient[j]) + carried[i] * work.gradient[j]
             terms = abs(slope[j]) + abs(coupling * work.gradient[j])
             terms = kept + abs(impulse[i]) * terms + abs(carried[i] * work.gradient[j])
-            work.saltation[i, j] = kept - taken if abs(kept - taken) > CANCELLED * terms else 0.0
+            # What is rounding of the terms would look like a direction.
+            work.saltation[i, j] = kept - taken if abs(kept - taken) > ROUNDED * terms else 0.0

@@ -9,13 +9,11 @@ instant, where all else is at rest, only guards and conditions could still make 
 from numba import njit
 
 from hybrid.kernels.jumps.past import fired_before, time_before, visit_before
+from hybrid.kernels.jumps.rest import ROUNDED
 from hybrid.kernels.limit.rounds import RESOLVED
 from hybrid.kernels.types.codes import BY_FLOW, BY_NOTHING, ENDLESS, HELD, NO_MODE
-from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
-# Share of a number that rounding may make up after a few operations with it.
-ROUNDED = 64.0 * EPSILON
 # A component is moved at the limit if a round moves it by this share of what the last round did: one that has
 # a limit stays there up to the error of that limit.
 MOVES_ON = 0.1

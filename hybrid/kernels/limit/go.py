@@ -12,28 +12,35 @@ from hybrid.kernels.arithmetic.clock import forward
 from hybrid.kernels.arithmetic.slopes import spread_of_rate
 from hybrid.kernels.events.crossings import Begin, first_change
 from hybrid.kernels.events.derivatives import speed_rounding
-from hybrid.kernels.events.guards import guard_speed, guard_value, has_program, may_jump, rounding_band, size_of_time
+from hybrid.kernels.events.guards import (
+    guard_speed,
+    guard_value,
+    has_program,
+    may_jump,
+    rounding_band,
+    size_of_time,
+)
 from hybrid.kernels.events.sampled import NOWHERE
 from hybrid.kernels.events.sides import mode_of_limit
 from hybrid.kernels.jumps.jump import assume_sizes, carry_tangents, go_onward, move
 from hybrid.kernels.jumps.locked import begin_instant
-from hybrid.kernels.jumps.past import fired_before
+from hybrid.kernels.jumps.past import fired_before, time_before
 from hybrid.kernels.jumps.record import remember_flight, remember_jump
-from hybrid.kernels.limit.endless import ROUNDED, hold_endless, mark_endless, may_be_held
+from hybrid.kernels.jumps.rest import ROUNDED
+from hybrid.kernels.limit.endless import hold_endless, mark_endless, may_be_held
 from hybrid.kernels.limit.impacts import extrapolate_impacts, series_of_impacts
 from hybrid.kernels.limit.rounds import (
     FEWEST_JUMPS,
+    NO_SERIES,
     RESOLVED,
     Series,
     extrapolate_rounds,
-    has_begun,
-    is_hidden,
-    no_series,
+    fewest_jumps,
     rounding_of_landing,
     series_of_rounds,
     sizes_of_visits,
     state_is_known,
-    time_is_known,
+    still_changes,
 )
 from hybrid.kernels.limit.tangent import drift_is_known, limit_matrix
 from hybrid.kernels.types.codes import ENDLESS, LIMIT, LIMIT_OF_CHATTER, NO_MODE, NO_TRANSITION
@@ -53,35 +60,43 @@ def may_accumulate(model, run, transition):
 
 @njit(**KERNEL)
 def known_limit(model, method, run, transition, work):
-    """The series of jumps whose limit is known, as ``work.settled (n,)``; none if there is none yet."""
-    series, impacts = no_series(), False
+    """The series of jumps whose limit is known, as ``work.settled (n,)``; none if there is none yet.
+
+    Two estimates of time and state agree, up to the tolerances and to what the rounding of a landing hides.
+    That is magnified by the sum of the series and by the rounding of its ratio, up to the last round.
+    """
+    series = NO_SERIES
     if run.mode == run.previous_mode and model.marker[transition] == 0:
-        if 0.0 < run.restitution < 1.0:
-            series = series_of_impacts(model, run, transition, work)
-        else:
-            run.chattering = 0
-        impacts = series.turn > 0
+        series = series_of_impacts(model, run, transition, work)
+    impacts = series.turn > 0
     if not impacts:
         series = series_of_rounds(model, run)
     if series.turn == 0:
         return series
+    turn, left, before = series.turn, series.left, run.trail[LIMIT]
     landing = rounding_of_landing(model, run, work)
-    if not time_is_known(method, series, landing):
-        run.trail[LIMIT, 0] = math.inf
-        return no_series()
-    before = run.trail[LIMIT]
+    hidden = min(landing / (1.0 - series.ratio) ** 2, series.latest)
+    if still_changes(series) * abs(series.shift) > method.rtol * left + hidden:
+        before[0] = math.inf
+        return NO_SERIES
     if impacts:
-        extrapolate_impacts(model, run, transition, series.left, work)
+        extrapolate_impacts(model, run, transition, left, work)
     else:
-        extrapolate_rounds(model, run, series.turn, series.turn, before)
-        extrapolate_rounds(model, run, series.turn, 0, work.settled)
-        mark_endless(model, run, series.turn, run.phase + series.left, work.settled, work)
-        hold_endless(model, run, series.turn, series.left, work)
-    # Where the next round cannot be resolved, there will be no better estimate.
-    known = state_is_known(model, method, run, series, landing, work) or is_hidden(series, landing, 1.0)
+        extrapolate_rounds(model, run, turn, turn, before)
+        extrapolate_rounds(model, run, turn, 0, work.settled)
+        mark_endless(model, run, turn, run.phase + left, work.settled, work)
+        hold_endless(model, run, turn, left, work)
+    known = state_is_known(model, method, run, series, hidden, work)
     for i in range(model.dimension):
         before[i] = work.settled[i]
-    return series if known and has_begun(series, run.jumps, landing) else no_series()
+    # In the next round landings are slower, so that rounding moves them by more.
+    next_round = series.ratio**2 * series.latest
+    lasted = time_before(model, run, 0, min(series.jumps, run.visits.shape[0]) - 1)
+    visible = left > RESOLVED * lasted and landing < RESOLVED * next_round
+    if visible and series.jumps < fewest_jumps(turn):
+        return NO_SERIES
+    # Where the next round cannot be resolved, there will be no better estimate.
+    return series if known or landing >= next_round else NO_SERIES
 
 
 @njit(**KERNEL)
@@ -93,7 +108,7 @@ def series_at_rest(model, run, work):
     recent window that holds every recent transition.
     """
     if run.jumps_here <= FEWEST_JUMPS:
-        return no_series()
+        return NO_SERIES
     turn = 1
     for back in range(1, min(run.jumps, run.recent.shape[0])):
         known = False
@@ -107,7 +122,7 @@ def series_at_rest(model, run, work):
         work.settled[i] = run.y[i]
         sizes[i] += clock * abs(work.field[i])
     mark_endless(model, run, turn, run.phase, work.settled, work)
-    return Series(turn, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Series(turn, run.jumps_here, 0.0, 0.0, 0.0, 0.0)
 
 
 @njit(**KERNEL)
@@ -143,10 +158,10 @@ def is_limit(model, run, turn, left, share, work):
             size += abs(work.gradient[i]) * sizes[i]
         if left == 0.0 and not stands_still(model, run, transition, t, place, share, work):
             return False
+        near = abs(value) <= share * size + rounding_band(model, run, transition, t, place, work)
         # A guard that jumps across zero is small on neither side of its jump.
-        if not abs(value) <= share * size + rounding_band(model, run, transition, t, place, work):
-            if not may_jump(model, run, transition, t, place, work):
-                return False
+        if not (near or may_jump(model, run, transition, t, place, work)):
+            return False
         model.reset(transition, t, place, model.parameters, work.state)
         for i in range(n):
             place[i] = work.state[i]
@@ -231,7 +246,7 @@ def go_to_limit(task, series, transition):
     """Go to the limit ``work.settled`` of a series, whose next jump would be that ``transition``.
 
     The limit is a jump of its own, into the mode that the transition names, if it names one. Its tangent map
-    is known for impacts on one guard. Returns false, and does nothing, if that map is to be known more exactly.
+    is known for impacts on one guard. Returns false, and does nothing, if later jumps tell it better.
     """
     _, model, method, run, record, work = task_of(task)
     n, tangents, turn, left = model.dimension, task.tangents, series.turn, series.left

@@ -11,9 +11,9 @@ import math
 from numba import njit
 
 from hybrid.kernels.events.guards import guard_acceleration, guard_speed, guard_value, rounding_band
-from hybrid.kernels.jumps.past import fired_before, time_before
+from hybrid.kernels.jumps.past import fired_before
 from hybrid.kernels.limit.endless import mark_endless
-from hybrid.kernels.limit.rounds import Series, no_series
+from hybrid.kernels.limit.rounds import NO_SERIES, Series
 from hybrid.kernels.types.codes import ENDLESS, IMPULSE, LIMIT
 from hybrid.kernels.types.options import KERNEL
 
@@ -27,48 +27,33 @@ def far_side(model, run, transition):
 
 
 @njit(**KERNEL)
-def remaining_chatter(model, run, transition, speed, work):
-    """Time ``2 v / (a (1 - r))`` that infinitely many flights with speeds ``v, r v, r^2 v, ...`` still take.
-
-    Zero if the flights do not shrink or nothing pulls the state back.
-    """
-    ratio = run.restitution
-    pull = far_side(model, run, transition) * guard_acceleration(
-        model, run, transition, run.mode, run.phase, run.y, work
-    )
-    if not (0.0 < ratio < 1.0 and pull > 0.0):
-        return 0.0
-    return 2.0 * speed / (pull * (1.0 - ratio))
-
-
-@njit(**KERNEL)
 def series_of_impacts(model, run, transition, work):
     """The series of impacts on one guard, known once two have followed each other.
 
     The last columns of ``run.trail`` hold what the next impact compares with: the guard's speed and the time
     left.
     """
-    n = model.dimension
-    model.field(run.mode, run.phase, run.y, model.parameters, work.field)
-    speed = guard_speed(model, transition, run.phase, run.y, work.field, work.gradient)
-    speed *= -far_side(model, run, transition)
-    value, span = guard_value(model, transition, run.phase, run.y, work.scalar), 0.0
+    n, ratio, side = model.dimension, run.restitution, -far_side(model, run, transition)
+    t, follows = run.phase, run.chatter_jumps + 1 == run.jumps and fired_before(run, 1) == transition
+    earlier, run.chattering = run.chattering if follows else 0, 0
+    if not 0.0 < ratio < 1.0:
+        return NO_SERIES
+    model.field(run.mode, t, run.y, model.parameters, work.field)
+    speed = side * guard_speed(model, transition, t, run.y, work.field, work.gradient)
+    value = guard_value(model, transition, t, run.y, work.scalar)
     # No chatter begins with a reset that leaves the guard.
-    if abs(value) <= rounding_band(model, run, transition, run.phase, run.y, work):
-        span = remaining_chatter(model, run, transition, speed, work)
-    if not span > 0.0:
-        run.chattering = 0
-        return no_series()
-    follows = run.chattering > 0 and run.chatter_jumps + 1 == run.jumps and fired_before(run, 1) == transition
-    before = run.trail[LIMIT, n]
+    if not abs(value) <= rounding_band(model, run, transition, t, run.y, work):
+        return NO_SERIES
+    pull = -side * guard_acceleration(model, run, transition, run.mode, t, run.y, work)
+    if not (pull > 0.0 and speed > 0.0):
+        return NO_SERIES
+    span, before, flight = 2.0 * speed / (pull * (1.0 - ratio)), run.trail[LIMIT, n], run.stay[run.mode]
     run.trail[IMPULSE, n], run.trail[LIMIT, n], run.chatter_jumps = speed, span, run.jumps
-    if not follows:
-        run.chattering, run.trail[LIMIT, 0] = 1, math.inf
-        return no_series()
-    run.chattering += 1
-    flight = run.stay[run.mode]
-    lasted = time_before(model, run, 0, min(run.chattering, run.visits.shape[0]) - 1)
-    return Series(1, run.restitution, flight, lasted, span, span + flight - before)
+    run.chattering = earlier + 1
+    if earlier == 0:
+        run.trail[LIMIT, 0] = math.inf
+        return NO_SERIES
+    return Series(1, run.chattering, ratio, flight, span, span + flight - before)
 
 
 @njit(**KERNEL)

@@ -13,7 +13,7 @@ from hybrid.kernels.events.guards import rounding_band
 from hybrid.kernels.jumps.past import fired_before, time_before, visit_before
 from hybrid.kernels.types.codes import ENDLESS, LIMIT
 from hybrid.kernels.types.layout import EPSILON
-from hybrid.kernels.types.options import KERNEL
+from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Rounds that must have occurred: two estimates of a limit and of a steady ratio need four durations.
 FEWEST_ROUNDS = 5
@@ -22,31 +22,29 @@ FEWEST_JUMPS = 16
 # The ratio of the rounds may change from one to the next by this share of its distance from 1. The series is
 # then summed up to about this share, and the agreement of two sums is left to judge.
 STEADY = 0.1
-# The share of a quantity that counts as nothing at a limit: what is left of the time, and how far the state
-# may be from the guards and from where the resets lead. Linear extrapolation and a landing's rounding reach it.
+# The share of a quantity that counts as nothing at a limit: of the time, what is left; of the state, how far
+# it may be from the guards, and how far the resets may move it. An extrapolation errs by its square.
 RESOLVED = 1e-6
 
 
 class Series(NamedTuple):
     """Jumps that accumulate.
 
-    The number of jumps in a round; the ``ratio`` by which each round is shorter than the last; how long the
-    ``latest`` took, and all rounds so far; the time ``left`` for those to come, and its ``shift`` since the
-    estimate one round before.
+    The number of jumps in a round, and of all that were made; the ``ratio`` by which each round is shorter
+    than the last; how long the ``latest`` took; the time ``left`` for those to come, and its ``shift`` since
+    the estimate one round before.
     """
 
     turn: Any
+    jumps: Any
     ratio: Any
     latest: Any
-    lasted: Any
     left: Any
     shift: Any
 
 
-@njit(**KERNEL)
-def no_series():
-    """What stands for jumps that do not accumulate."""
-    return Series(0, 0.0, 0.0, 0.0, 0.0, 0.0)
+# What stands for jumps that do not accumulate.
+NO_SERIES = Series(0, 0, 0.0, 0.0, 0.0, 0.0)
 
 
 @njit(**KERNEL)
@@ -75,30 +73,36 @@ def time_left_of_rounds(model, run, turn, back):
 
 
 @njit(**KERNEL)
-def repeats(run, turn):
-    """Whether the last rounds of ``turn`` jumps have been of the same transitions in the same order."""
-    for back in range((FEWEST_ROUNDS - 1) * turn):  # noqa: SIM110 (no generators in kernels)
-        if fired_before(run, back) != fired_before(run, back + turn):
-            return False
-    return True
+def jumps_in_turn(run, turn, most):
+    """Of how many last jumps, at ``most``, every one was of the same transition as that ``turn`` later."""
+    back = 0
+    while back + turn < most and fired_before(run, back) == fired_before(run, back + turn):
+        back += 1
+    return back + turn
+
+
+@njit(**INLINE)
+def fewest_jumps(turn):
+    """How many jumps in rounds of ``turn`` are made before their limit is taken."""
+    return max(FEWEST_JUMPS, FEWEST_ROUNDS * turn) + 1
 
 
 @njit(**KERNEL)
 def series_of_rounds(model, run):
     """The series of transitions that fire in turn; impacts on one guard have a better one of their own."""
     if not shortens(model, run):
-        return no_series()
-    known = min(run.jumps, run.visits.shape[0]) - 1
-    for turn in range(1, known // FEWEST_ROUNDS + 1):
+        return NO_SERIES
+    known = min(run.jumps, run.visits.shape[0])
+    for turn in range(2 if run.chattering > 0 else 1, (known - 1) // FEWEST_ROUNDS + 1):
+        jumps = jumps_in_turn(run, turn, min(known, fewest_jumps(turn)))
+        if jumps <= FEWEST_ROUNDS * turn:
+            continue
         left, ratio = time_left_of_rounds(model, run, turn, 0)
         earlier, _ = time_left_of_rounds(model, run, turn, turn)
-        if left > 0.0 and earlier > 0.0 and repeats(run, turn):
-            if turn == 1 and run.chattering > 0:
-                return no_series()
+        if left > 0.0 and earlier > 0.0:
             latest = time_before(model, run, 0, turn)
-            lasted = time_before(model, run, 0, min(known, max(FEWEST_JUMPS, FEWEST_ROUNDS * turn)))
-            return Series(turn, ratio, latest, lasted, left, left + latest - earlier)
-    return no_series()
+            return Series(turn, jumps, ratio, latest, left, left + latest - earlier)
+    return NO_SERIES
 
 
 @njit(**KERNEL)
@@ -134,62 +138,31 @@ def rounding_of_landing(model, run, work):
 
 @njit(**KERNEL)
 def still_changes(series):
-    """So many times the difference of the last two estimates may later rounds change the limit, at least once.
+    """How many times the difference of the last two estimates later rounds may still change the limit by.
 
-    Errors go with the square of the time left, so that the changes to come sum up to ``r^2 + r^4 + ...``.
+    Errors go with the square of the time left: the changes to come are ``r^2 + r^4 + ...``, and taken for 1
+    if they are less.
     """
     square = series.ratio**2
     return max(1.0, square / (1.0 - square))
 
 
 @njit(**KERNEL)
-def time_is_known(method, series, landing):
-    """Whether two estimates of the time of a limit agree, up to the tolerances and to what rounding hides."""
-    unknown = still_changes(series) * abs(series.shift)
-    return unknown <= method.rtol * series.left + hidden_time(series, landing)
+def state_is_known(model, method, run, series, hidden, work):
+    """Whether the estimates of the state in ``work.settled`` and ``run.trail`` agree, but for counters.
 
-
-@njit(**KERNEL)
-def hidden_time(series, landing):
-    """The time of a limit that the rounding of a landing hides, no longer than the last round.
-
-    It is magnified by the sum of the series and by the rounding of its ratio.
+    They may differ by the tolerances, and by what the state moves in the ``hidden`` time. The sizes of the
+    components go to ``work.trial``, with what may be unknown of them.
     """
-    return min(landing / (1.0 - series.ratio) ** 2, series.latest)
-
-
-@njit(**KERNEL)
-def state_is_known(model, method, run, series, landing, work):
-    """Whether ``work.settled (n,)`` and the estimate in ``run.trail`` agree, up to the same, but for counters.
-
-    The sizes of the components go to ``work.trial``, with what rounding hides of them.
-    """
-    n, sizes, times, hidden = model.dimension, work.trial, still_changes(series), hidden_time(series, landing)
-    sizes_of_visits(model, run, max(FEWEST_JUMPS, FEWEST_ROUNDS * series.turn), sizes)
+    n, sizes, times = model.dimension, work.trial, still_changes(series)
+    sizes_of_visits(model, run, fewest_jumps(series.turn), sizes)
     model.field(run.mode, run.phase, run.y, model.parameters, work.field)
     last, before = run.visits[visit_before(run, 0)], run.visits[visit_before(run, series.turn)]
     known = True
     for i in range(n):
         slack = hidden * (abs(work.field[i]) + abs(last[i] - before[i]) / series.latest)
-        allowed = method.atol + method.rtol * sizes[i] + slack
-        apart = not times * abs(work.settled[i] - run.trail[LIMIT, i]) <= allowed
-        known = known and not (apart and run.trail[ENDLESS, i] == 0.0)
+        apart = times * abs(work.settled[i] - run.trail[LIMIT, i])
+        agree = apart <= method.atol + method.rtol * sizes[i] + slack
+        known = known and (agree or run.trail[ENDLESS, i] != 0.0)
         sizes[i] = max(sizes[i], (method.atol + slack) / RESOLVED)
     return known
-
-
-@njit(**KERNEL)
-def is_hidden(series, landing, share):
-    """Whether the rounding of landings will be more than a ``share`` of the next round.
-
-    That round is shorter by the ratio, and the rounding of its slower landings is larger by the ratio.
-    """
-    return landing >= share * series.ratio**2 * series.latest
-
-
-@njit(**KERNEL)
-def has_begun(series, jumps, landing):
-    """Whether enough jumps have been made, or those to come would be too brief to be seen or resolved."""
-    if jumps > max(FEWEST_JUMPS, FEWEST_ROUNDS * series.turn):
-        return True
-    return series.left <= RESOLVED * series.lasted or is_hidden(series, landing, RESOLVED)

@@ -11,8 +11,7 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.slopes import spread_of_rate, whole_jacobian
 from hybrid.kernels.events.guards import ROUNDING_OF_STATE, rounding_band
-from hybrid.kernels.jumps.rest import NEARBY, rest_matrix
-from hybrid.kernels.limit.endless import ROUNDED
+from hybrid.kernels.jumps.rest import NEARBY, ROUNDED, rest_matrix
 from hybrid.kernels.limit.impacts import far_side, follow_mean, impact, mean_field
 from hybrid.kernels.types.codes import ENDLESS, IMPULSE
 from hybrid.kernels.types.layout import EPSILON
@@ -96,14 +95,14 @@ def rounding_of_drift(model, run, transition, start, span, out, work):
 
 @njit(**KERNEL)
 def add_drift(model, run, transition, j, speed, span, work):
-    """Carry the column ``j`` of ``work.saltation`` to the limit, and add its effect on the instant of the limit.
+    """Carry the column ``j`` of ``work.saltation`` to the limit, and add what it does to the limit's instant.
 
     The column keeps the state without its speed, ``work.trial``, on its guard. The impulse takes out the
     guard's speed, and what the pull adds to it in the time ``span``; the speed has its sign.
     """
     n, t, impulse, start = model.dimension, run.phase, run.trail[IMPULSE], work.trial
     place, after, turned, noise = work.second_error, work.new, work.sizes[0], work.rounding[2]
-    step, pull, ratio, bent, change = math.inf, 0.0, 0.0, 0.0, 1.0
+    step, bend, ratio, bent, change = math.inf, 0.0, 0.0, 0.0, 1.0
     for i in range(n):
         size, entry = max(abs(start[i]), run.scale[i]), abs(work.saltation[i, j])
         if size > 0.0 and entry > 0.0:
@@ -121,11 +120,10 @@ def add_drift(model, run, transition, j, speed, span, work):
         for i in range(n):
             here, before = (after[i] - place[i]) / change, turned[i]
             turned[i] = here if part == 0 else changed(before, here, rounding_of_impulse(run, i, change))
-        pull = acceleration if part == 0 else changed(pull, acceleration, 0.0)
+        bend = acceleration if part == 0 else changed(bend, acceleration, 0.0)
         ratio = share if part == 0 else changed(ratio, share, 0.0)
         bent += 0.5 * acceleration
-    side = -far_side(model, run, transition)
-    run.instant[j] += span * (pull / bent * -1.0 + ratio / (1.0 - run.restitution)) / (2.0 * step)
+    run.instant[j] += span * (ratio / (1.0 - run.restitution) - bend / bent) / (2.0 * step)
     for i in range(n):
         drift = changed(work.rounding[0, i], work.rounding[1, i], noise[i])
         if run.trail[ENDLESS, i] == 0.0:
