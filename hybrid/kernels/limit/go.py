@@ -62,8 +62,9 @@ def may_accumulate(model, run, transition):
 def known_limit(model, method, run, transition, work):
     """The series of jumps whose limit is known, as ``work.settled (n,)``; none if there is none yet.
 
-    Two estimates of time and state agree, up to the tolerances and to what the rounding of a landing hides.
-    That is magnified by the sum of the series and by the rounding of its ratio, up to the last round.
+    Two estimates of time and state agree up to the tolerances. Once they get no closer from round to round,
+    they may differ by what the rounding of a landing hides: it is magnified by the sum of the series and by
+    the rounding of its ratio, but it hides no more than the last round.
     """
     series = NO_SERIES
     if run.mode == run.previous_mode and model.marker[transition] == 0:
@@ -71,12 +72,17 @@ def known_limit(model, method, run, transition, work):
     impacts = series.turn > 0
     if not impacts:
         series = series_of_rounds(model, run)
-    if series.turn == 0:
+    n, turn, left, before = model.dimension, series.turn, series.left, run.trail[LIMIT]
+    misfit, misfit_before = still_changes(series) * abs(series.shift), run.trail[ENDLESS, n]
+    run.trail[ENDLESS, n] = misfit if turn > 0 else math.inf
+    if turn == 0:
         return series
-    turn, left, before = series.turn, series.left, run.trail[LIMIT]
-    landing = rounding_of_landing(model, run, work)
-    hidden = min(landing / (1.0 - series.ratio) ** 2, series.latest)
-    if still_changes(series) * abs(series.shift) > method.rtol * left + hidden:
+    # In the next round landings are slower, so that rounding moves them by more.
+    landing, next_round = rounding_of_landing(model, run, work), series.ratio**2 * series.latest
+    closer = misfit <= series.ratio ** (1.0 / turn) * misfit_before and landing < next_round
+    hidden = 0.0 if closer else min(landing / (1.0 - series.ratio) ** 2, series.latest)
+    lasted = time_before(model, run, 0, min(series.jumps, run.visits.shape[0]) - 1)
+    if misfit > method.rtol * lasted + hidden:
         before[0] = math.inf
         return NO_SERIES
     if impacts:
@@ -87,11 +93,8 @@ def known_limit(model, method, run, transition, work):
         mark_endless(model, run, turn, run.phase + left, work.settled, work)
         hold_endless(model, run, turn, left, work)
     known = state_is_known(model, method, run, series, hidden, work)
-    for i in range(model.dimension):
+    for i in range(n):
         before[i] = work.settled[i]
-    # In the next round landings are slower, so that rounding moves them by more.
-    next_round = series.ratio**2 * series.latest
-    lasted = time_before(model, run, 0, min(series.jumps, run.visits.shape[0]) - 1)
     visible = left > RESOLVED * lasted and landing < RESOLVED * next_round
     if visible and series.jumps < fewest_jumps(turn):
         return NO_SERIES

@@ -90,7 +90,7 @@ def test_a_run(shapes):
         **dict.fromkeys(("first_step", "stay"), (4,)),
         **dict.fromkeys(("scale", "stretch"), (N,)),
         **dict.fromkeys(("growth", "growth_before"), (K,)),
-        "trail": (5, N + 1),
+        "trail": (4, N + 1),
         "before": (N * K,),
         "instant": (N * (1 + N),),
     }
