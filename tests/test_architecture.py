@@ -62,6 +62,7 @@ KERNEL_ROOMS = tuple(
         "guards",
         "steps",
         "jumps",
+        "limit",
         "evaluate",
         "drive",
     )
