@@ -113,6 +113,12 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int, rows: 
     return Layout(Work, shapes)
 
 
+@cache
+def no_record(dimension: int) -> Any:
+    """A record that keeps nothing: as nobody writes to it, all runs share it."""
+    return empty_record(dimension, 0)
+
+
 def empty_record(dimension: int, degree: int, steps: int = 0, jumps: int = 0) -> Any:
     """A record with room for that many steps and jumps; none means that they are not kept."""
     # Room that is not used costs nothing, not even to be cleared: all is written before it is read.
@@ -143,7 +149,7 @@ def record_layout(dimension: int, degree: int, steps: int, jumps: int) -> Any:
 
 @lru_cache(MOST_LAYOUTS)
 def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> Any:
-    """Where the arrays of a run lie."""
+    """Where the arrays of a run lie, and what they hold in one that has no mode yet and has not jumped."""
     n = dimension
     shapes = {
         "counters": (len(COUNTERS),),
@@ -166,20 +172,13 @@ def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> A
         "growth_before": (tangents,),
         "instant": (n * (1 + n),),
     }
-    return Layout(Run, shapes)
-
-
-@cache
-def _first_entries() -> tuple[np.ndarray, np.ndarray]:
-    """The named entries of a run that has no mode yet and has not jumped."""
-    counters = dict.fromkeys(COUNTERS, 0) | {
-        "stage": codes.ENTERING,
-        "last_fired": codes.NO_TRANSITION,
-        "pending": codes.NO_TRANSITION,
-        "previous_mode": codes.NO_MODE,
-    }
-    numbers = dict.fromkeys(NUMBERS, 0.0) | {"last_jump_phase": np.nan}
-    return np.array(list(counters.values())), np.array(list(numbers.values()))
+    layout = Layout(Run, shapes)
+    first = layout.zeros()
+    first.stage, first.previous_mode = codes.ENTERING, codes.NO_MODE
+    first.last_fired = first.pending = codes.NO_TRANSITION
+    first.last_jump_phase = np.nan
+    layout.begin_as(first)
+    return layout
 
 
 def fresh_run(
@@ -191,10 +190,9 @@ def fresh_run(
     horizon: float = 0.0,
 ) -> tuple[Any, float]:
     """The run at its start, in no mode yet, and the phase of the start; ``horizon`` is how long it takes."""
-    run, n = layout.zeros(), model.dimension
+    run, n = layout.fresh(), model.dimension
     y = run.y
     cycle, phase = split_time(t0, model.period)
-    run.counters[:], run.numbers[:] = _first_entries()
     run.cycle, run.phase, run.horizon = cycle, phase, horizon
     y[:n] = state
     if tangent is not None:

@@ -19,13 +19,14 @@ from hybrid.kernels.types.kinds import (
     SEVERAL,
     TRUTH,
     Array,
-    Number,
     kind_named,
     text_of,
     width_of,
     words_of,
 )
 
+# The place of a converter for numbers.
+NUMBER = object()
 CALL = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_char_p)
 # What a word is as a result.
 RESULTS = {
@@ -71,11 +72,7 @@ class Kernel:
     def __init__(self, name: str, code: Code, result: str, arguments: list[str]) -> None:
         self.name, self._code, self._result = name, code, result
         kinds = [kind_named(each) for each in arguments]
-        # How each argument is converted: an address has None, and numbers are left to the table.
-        self._converters = [
-            words_of(f"argument {i} of {name}", kind) if isinstance(kind, Array) else kind
-            for i, kind in enumerate(kinds)
-        ]
+        self._converters = [_converter(f"argument {i} of {name}", kind) for i, kind in enumerate(kinds)]
         self._table = struct.Struct("".join("d" if kind == REAL else width_of(kind) * "q" for kind in kinds))
 
     def __call__(self, *values: Any) -> Any:
@@ -84,7 +81,7 @@ class Kernel:
         for value, converter in zip(values, self._converters, strict=True):
             if converter is None:
                 words.append(value.address)
-            elif isinstance(converter, Number):
+            elif converter is NUMBER:
                 words.append(value)
             else:
                 words += converter(value)
@@ -103,6 +100,13 @@ class Kernel:
     @cached_property
     def _read(self) -> Any:
         return RESULTS[self._result]
+
+
+def _converter(what: str, kind: Any) -> Any:
+    """How an argument becomes words: an address has None, and a number is left to the table."""
+    if kind is None:
+        return None
+    return words_of(what, kind) if isinstance(kind, Array) else NUMBER
 
 
 def file_of(signatures: Mapping[str, list[str]], code: bytes) -> bytes:
