@@ -158,10 +158,9 @@ class Exponents:
 
     def _row(self, rows: Rows, point: Mapping[str, float], place: Place | None) -> dict[str, Any]:
         trajectory = rows.begin(point, place, self._vectors, rows.system)
-        spectrum = Estimate(trajectory, self._length(trajectory)).run(
-            self.transient, self.intervals, False, silent()
-        )
-        return {
+        estimate = Estimate(trajectory, self._length(trajectory))
+        spectrum = estimate.run(self.transient, self.intervals, False, silent())
+        found = {
             "exponents": spectrum.exponents,
             "standard_error": spectrum.standard_error,
             "sum_rule": spectrum.sum_rule,
@@ -172,6 +171,8 @@ class Exponents:
             **({"section": self._section(rows, point, trajectory, spectrum)} if self.points else {}),
             "status": spectrum.status,
         }
+        estimate.release()
+        return found
 
     def carry(self, point: Mapping[str, float], place: Place | None) -> Place | None:
         """State and mode after the transient, rounded up to whole forcing periods to keep the phase."""
