@@ -5,8 +5,8 @@
 
 from numba import njit
 
-import hybrid.kernels.types.numba_types  # noqa: F401 (so that kernels may take structures)
-from hybrid.kernels.types.part_compiler import PartCompiler
+import hybrid.kernels.types.numba_door.numba_types  # noqa: F401 (so that kernels may take structures)
+from hybrid.kernels.types.numba_door.part_compiler import PartCompiler
 
 # Sums may be reordered and fused, but nan and infinity keep their meaning in comparisons (``math.isfinite``
 # takes the difference of a number and itself, which may be taken for zero). Kernels allocate nothing and own

@@ -12,7 +12,6 @@ import pytest
 
 from hybrid.compiler.cache.kernel import file_of, kernels_in
 from hybrid.compiler.cache.loader import _without_collection
-from hybrid.kernels.types.export import exports_of, object_code
 from hybrid.kernels.types.kinds import (
     CUBE,
     INDEX_MATRIX,
@@ -26,6 +25,7 @@ from hybrid.kernels.types.kinds import (
     function,
     text_of,
 )
+from hybrid.kernels.types.numba_door.export import exports_of, object_code
 from hybrid.kernels.types.options import exported
 from hybrid.kernels.types.structure import Structure
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.types.kinds import CUBE, INDICES, INTEGER, MATRIX, REAL, VECTOR, function
-from hybrid.kernels.types.numba_types import signature_of
+from hybrid.kernels.types.numba_door.numba_types import signature_of
 from hybrid.kernels.types.structure import Layout, Structure
 
 

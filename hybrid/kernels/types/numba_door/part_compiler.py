@@ -14,7 +14,7 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
 
-from hybrid.kernels.types.lowering import KernelLowering
+from hybrid.kernels.types.numba_door.lowering import KernelLowering
 
 # What every step of a run and its tangent vectors go through. Optimised by itself as well, it comes out a few
 # parts in a hundred faster.
