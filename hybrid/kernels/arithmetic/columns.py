@@ -8,7 +8,7 @@ one vector data that it has just written as several. So the columns of the state
 
 import numpy as np
 from numba import types
-from numba.extending import intrinsic, overload
+from numba.extending import overload
 
 from hybrid.kernels.arithmetic.lanes import HERE, matrix_of
 from hybrid.kernels.instructions.registers import (
@@ -25,6 +25,7 @@ from hybrid.kernels.types.numba_door.building import (
     alloca_once_value,
     for_range,
     for_range_slice,
+    intrinsic,
     unpack_tuple,
 )
 

@@ -4,11 +4,12 @@ In plain Python ``Lanes`` are arrays ``(4,)``, so the same code runs compiled an
 """
 
 import operator
+from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, models, overload, register_jitable, register_model
+from numba.extending import models, overload, register_jitable, register_model
 
 from hybrid.kernels.instructions.registers import (
     FUSED,
@@ -22,11 +23,11 @@ from hybrid.kernels.instructions.registers import (
     write,
 )
 from hybrid.kernels.types.codes import NARROW
-from hybrid.kernels.types.numba_door.building import unpack_tuple
+from hybrid.kernels.types.numba_door.building import intrinsic, unpack_tuple
 from hybrid.kernels.types.numba_door.part_compiler import PartCompiler
 
 # These functions are small and run at every order: without inlining, the call would cost as much as the work.
-HERE = {
+HERE: Any = {
     "_nrt": False,
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,

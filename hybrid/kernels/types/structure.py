@@ -13,6 +13,7 @@ Structures that are made again and again, with other numbers in arrays of the sa
 import math
 from ctypes import addressof, c_char
 from itertools import accumulate
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -35,6 +36,13 @@ class Structure:
     after ``class Run(Structure, counters=("mode", "cycle"))``, ``run.mode`` reads and writes
     ``run.counters[0]``, in a kernel and in Python. The columns of a matrix have names in the same way.
     """
+
+    # What is found of each class: the kinds of its fields, the field and the place of each named entry, how a
+    # field becomes words, and where its words begin.
+    _fields: ClassVar[dict[str, Any]]
+    _entries: ClassVar[dict[str, tuple[str, int]]]
+    _words: ClassVar[dict[str, Any]]
+    _places: ClassVar[dict[str, int]]
 
     def __init_subclass__(cls, **named_entries):
         """Find the place of each field from the annotations, and the fields of the named entries."""
@@ -118,7 +126,9 @@ class Layout:
         self.kind, self.shared = kind, shared
         fields = kind._fields
         _check_fields(kind, [*shapes, *shared])
-        table, moving, offsets, end = [], [], {}, 0
+        table: list[int] = []
+        moving: list[bool] = []
+        offsets, end = {}, 0
         for name in fields:
             if name in shapes:
                 offsets[name] = end

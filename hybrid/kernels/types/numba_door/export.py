@@ -32,7 +32,7 @@ class Export(NamedTuple):
 
     kernel: Any
     result: Any
-    arguments: tuple
+    arguments: tuple[Any, ...]
 
 
 def exports_of(module):
@@ -50,7 +50,7 @@ def object_code(exports):
 
     Functions that several of them call are compiled once.
     """
-    library = None
+    library: Any = None
     for name, (kernel, result, arguments) in exports.items():
         signature = signature_of(result, *arguments)
         kernel.compile(signature)

@@ -7,6 +7,7 @@ returns becomes the tuple of all components.
 
 import operator
 from functools import lru_cache
+from typing import Any
 
 from numba.core import ir, types
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -65,12 +66,16 @@ class _Change(FunctionPass):
     def __init__(self):
         super().__init__()
 
+    def change_of(self, state):
+        """The change: a function of an assignment and of the list for those before it; whether it changed."""
+        raise NotImplementedError
+
     def run_pass(self, state):
         """Whether an assignment was changed."""
         func_ir, changed = state.func_ir, False
         change = self.change_of(state)
         for block in func_ir.blocks.values():
-            body = []
+            body: list[Any] = []
             for statement in block.body:
                 if isinstance(statement, ir.Assign):
                     changed |= change(statement, body)
@@ -97,7 +102,7 @@ class _PowersByProducts(_Change):
     _name = "powers_by_products"
 
     def change_of(self, state):
-        """The change of one assignment."""
+        """One for all functions."""
         return _replace_power
 
 
@@ -117,7 +122,7 @@ class _CompleteChanges(_Change):
     _name = "complete_changes"
 
     def change_of(self, state):
-        """The change of one assignment."""
+        """One for the variables that this function may return."""
         func_ir, complete = state.func_ir, state.pipeline.complete
         returned = _returned(func_ir)
 

@@ -4,6 +4,7 @@ Only the compilation of kernels imports this module.
 """
 
 from functools import cache
+from typing import Any
 
 from llvmlite import ir
 from numba import types
@@ -52,7 +53,7 @@ def numba_type(kind):
     if is_bundle(kind):
         return types.BaseTuple.from_types([numba_type(each) for each in kind.__annotations__.values()], kind)
     if isinstance(kind, Function):
-        return types.ExternalFunctionPointer(signature_of(kind.result, *kind.arguments), None)
+        return types.ExternalFunctionPointer(signature_of(kind.result, *kind.arguments), None)  # type: ignore[arg-type]
     return StructureType(kind)
 
 
@@ -68,7 +69,8 @@ class _Address(models.OpaqueModel):
 
 @typeof_impl.register(Structure)
 def _typeof(value, context):
-    return numba_type(type(value))
+    kind: Any = type(value)
+    return numba_type(kind)
 
 
 @unbox(StructureType)
@@ -83,11 +85,11 @@ def _unbox(kind, value, c):
 class _Fields(AttributeTemplate):
     key = StructureType
 
-    def generic_resolve(self, structure, field):
-        if field in structure.entries:
-            kind = structure.fields[structure.entries[field][0]]
+    def generic_resolve(self, value, attr):  # type: ignore[override]
+        if attr in value.entries:
+            kind = value.fields[value.entries[attr][0]]
             return kind.dtype if kind.ndim == 1 else _column_type(kind)
-        return structure.fields.get(field)
+        return value.fields.get(attr)
 
 
 @lower_getattr_generic(StructureType)

@@ -9,6 +9,8 @@ expressions and no references to count, so many of its passes change nothing. Wh
 or a type, it finds out again in every function; here it is remembered.
 """
 
+from typing import Any
+
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
@@ -174,8 +176,8 @@ class _Remembering:
 
 
 # What has been found for all kernels: signatures of calls, and sizes of types in memory by their text.
-_SIGNATURES = {}
-_SIZES = {}
+_SIGNATURES: dict[Any, Any] = {}
+_SIZES: dict[str, int] = {}
 
 
 class PartCompiler(CompilerBase):
