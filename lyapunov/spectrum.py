@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from functools import cache
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -249,7 +249,7 @@ def lyapunov_spectrum(
     length = interval_length(trajectory, interval, transient + intervals)
     load_kernels("lyapunov.kernels")
     with trajectory.stop, progress_bar(transient + intervals, "Lyapunov spectrum", progress) as bar:
-        return Estimate(trajectory, length).run(transient, intervals, history, bar)
+        return Estimate(trajectory, length).spectrum(transient, intervals, history, bar)
 
 
 def first_vectors(system: HybridSystem, k: int | None) -> np.ndarray:
@@ -295,6 +295,26 @@ def generic_directions(n: int, k: int) -> np.ndarray:
     return np.asarray(directions[:, :k])
 
 
+class Means(NamedTuple):
+    """What is found of an orbit over ``intervals`` intervals, as in a `LyapunovSpectrum`.
+
+    ``values`` are the means of all columns of the growth rates, ``batches`` those of batches.
+    """
+
+    exponents: np.ndarray
+    standard_error: np.ndarray
+    sum_rule: float
+    growths: np.ndarray
+    intervals: int
+    jumps_per_interval: float
+    steps_per_interval: float
+    mode: str
+    x: np.ndarray
+    status: Status
+    values: np.ndarray
+    batches: np.ndarray
+
+
 class Estimate:
     """Advances a trajectory and accumulates the growth rates, which the kernel returns in bursts."""
 
@@ -317,8 +337,20 @@ class Estimate:
         END.take_back(self.end)
         self.trajectory.release()
 
-    def run(self, transient: int, intervals: int, history: bool, bar: Progress) -> LyapunovSpectrum:
+    def spectrum(self, transient: int, intervals: int, history: bool, bar: Progress) -> LyapunovSpectrum:
         """The spectrum over ``intervals`` intervals, after ``transient`` intervals."""
+        found: dict[str, Any] = self.run(transient, intervals, history, bar)._asdict()
+        values, batches = found.pop("values"), found.pop("batches")
+        system = self.trajectory.system
+        return LyapunovSpectrum(
+            **found,
+            interval=self.interval,
+            names=Names(system.state_names, dict(system.units)),
+            jump_rates=JumpRates.of(system, self.trajectory.tangents, values, batches),
+        )
+
+    def run(self, transient: int, intervals: int, history: bool, bar: Progress) -> Means:
+        """What is found over ``intervals`` intervals, after ``transient`` intervals."""
         trajectory, k = self.trajectory, self.trajectory.tangents
         code = codes.DONE
         if transient:
@@ -328,27 +360,27 @@ class Estimate:
             # A vector of which only rounding was left is by now a new direction, like those at the start.
             trajectory.run.indistinct = 0
         mean = TaperedMean(self.columns)
-        jumps, steps = trajectory.jumps, int(trajectory.run.steps)
+        jumps, steps = trajectory.run.jumps, trajectory.run.steps
         self.grazed_growth = trajectory.run.ill_conditioned_growth
         growths = np.empty((0, k))
         if code == codes.DONE:
             growths, code = self._collect(intervals, mean, history, bar)
         values, means = mean.value(), closed_batch_means(self.sums.batches, self.sums.batch_state)
         error = standard_error_from_batches(means[:, :k]) * taper_inflation()
-        return LyapunovSpectrum(
-            exponents=values[:k],
-            standard_error=error,
-            sum_rule=float(values[k]),
-            growths=growths,
-            interval=self.interval,
-            intervals=mean.count,
-            jumps_per_interval=(trajectory.jumps - jumps) / max(mean.count, 1),
-            steps_per_interval=(int(trajectory.run.steps) - steps) / max(mean.count, 1),
-            mode=trajectory.mode,
-            x=trajectory.x,
-            status=self._status(code, max(mean.count, 1)),
-            names=Names(trajectory.system.state_names, trajectory.system.units),
-            jump_rates=JumpRates.of(trajectory.system, k, values, means),
+        count = max(mean.count, 1)
+        return Means(
+            values[:k],
+            error,
+            float(values[k]),
+            growths,
+            mean.count,
+            (trajectory.run.jumps - jumps) / count,
+            (trajectory.run.steps - steps) / count,
+            trajectory.mode,
+            trajectory.x,
+            self._status(code, count),
+            values,
+            means,
         )
 
     def _collect(
@@ -395,6 +427,8 @@ class Estimate:
         the transient alone does not mean that.
         """
         run, n = self.trajectory.run, self.trajectory.model.dimension
+        if run.y[n:].all():
+            return
         vectors = run.y[n:].reshape(-1, n)
         gone = ~vectors.any(axis=1)
         if gone.any():

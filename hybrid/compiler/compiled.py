@@ -216,20 +216,22 @@ class CompiledSystem:
 
     def at(self, parameters: Mapping[str, float] | None, model: Any) -> Any:
         """A model at parameter values."""
-        return self.at_values(self.system.parameter_values(parameters), model, given=bool(parameters))
-
-    def at_values(self, values: np.ndarray, model: Any, *, given: bool = True) -> Any:
-        """A model at a parameter vector, which it keeps; ``given`` if these are not the default values."""
-        period = period_at(self.system.period, self.system.variables, values) or 0.0
-        if given and not self.emitted.proved_period:
-            self._check_period(values, period)
+        values = self.system.parameter_values(parameters)
+        period = self.period_at(values, given=bool(parameters))
         changes: dict[str, Any] = {"parameters": values, "period": period}
         if self.emitted.programs.rows:
             changes["programs"] = self._programs.replace(parameters=values)
-        at_values = model.replace(**changes)
+        found = model.replace(**changes)
         # Runs may share a model.
         values.flags.writeable = False
-        return at_values
+        return found
+
+    def period_at(self, values: np.ndarray, *, given: bool = True) -> float:
+        """The forcing period, or 0, at a parameter vector; ``given`` if these are not the default values."""
+        period = period_at(self.system.period, self.system.variables, values) or 0.0
+        if given and not self.emitted.proved_period:
+            self._check_period(values, period)
+        return period
 
     def _check_period(self, values: np.ndarray, period: float) -> None:
         """ArgumentError unless the functions have the period at these values, which are remembered."""

@@ -15,7 +15,8 @@ from hybrid.compiler.compiled import CompiledSystem
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
 from hybrid.kernels.types.layout import Attempts, Method, Parts, Task
-from hybrid.simulation.memory import MOST_LAYOUTS, no_record, run_layout, work_layout
+from hybrid.kernels.types.structure import MOST_SPARES
+from hybrid.simulation.memory import MOST_LAYOUTS, Memory, no_record, run_layout, work_layout
 from hybrid.solvers import Solver, Taylor
 from hybrid.solvers.tableau import SERIES_NODES, SERIES_WEIGHTS
 from hybrid.status import StatusCode
@@ -53,6 +54,19 @@ class Plan:
     degree: int
     run_layout: Any
     work_layout: Any
+    spares: list[Memory] = attrs.field(factory=list, init=False)
+
+    def memory(self) -> Memory:
+        """The memory for a run."""
+        try:
+            return self.spares.pop()
+        except IndexError:
+            return Memory(self)
+
+    def take_back(self, memory: Memory) -> None:
+        """Keep the memory of a run that nobody can advance or look at any more."""
+        if len(self.spares) < MOST_SPARES:
+            self.spares.append(memory)
 
     @property
     def parts(self) -> Any:

@@ -15,7 +15,7 @@ from hybrid.kernels.types import codes
 from hybrid.kernels.types.codes import UNLIMITED
 from hybrid.simulation.initial_mode import choose_mode
 from hybrid.simulation.interrupt import CTRL_C, FIRST_BURST, Bursts, Stop
-from hybrid.simulation.memory import fresh_run, fresh_work
+from hybrid.simulation.memory import Memory
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import Plan, check_solver, plan_of
 from hybrid.solvers import Solver
@@ -53,7 +53,7 @@ def start(
     if system.growth is not None:
         explore(system, t0, state, system.parameter_values(parameters), mode)
     common = Common(compile_system(system), check_solver(solver), tangent, t0, time, horizon, stop)
-    return common.begin(state, mode, lambda plan: common.compiled.given(parameters, plan.model))
+    return common.begin(state, mode, lambda plan, memory: common.compiled.given(parameters, plan.model))
 
 
 def explore(system: HybridSystem, t0: float, state: np.ndarray, values: np.ndarray, mode: str | None) -> None:
@@ -78,30 +78,38 @@ class Common:
     stop: Stop = CTRL_C
 
     def begin_at(self, state: np.ndarray, mode: str | None, values: np.ndarray) -> Trajectory:
-        """A trajectory at its start, at a parameter vector, which it keeps."""
-        return self.begin(state, mode, lambda plan: self.compiled.at_values(values, plan.model))
+        """A trajectory at its start, at a parameter vector."""
+        period = self.compiled.period_at(values)
+        return self.begin(state, mode, lambda plan, memory: memory.model_at(values, period))
 
-    def begin(self, state: np.ndarray, mode: str | None, model_of: Callable[[Plan], Any]) -> Trajectory:
-        """A trajectory at its start; ``model_of(plan)`` is the model at the parameters of the run."""
+    def begin(
+        self, state: np.ndarray, mode: str | None, model_of: Callable[[Plan, Memory], Any]
+    ) -> Trajectory:
+        """A trajectory at its start; ``model_of(plan, memory)`` is the model at the parameters of the run."""
         compiled, tangents = self.compiled, 0 if self.tangent is None else self.tangent.shape[1]
         plan = plan_of(compiled, self.solver, tangents)
-        model = model_of(plan)
+        memory = plan.memory()
+        model = model_of(plan, memory)
         check_time(self.time, self.t0, model.period)
-        run, phase0 = fresh_run(plan.run_layout, model, state, self.tangent, self.t0, self.horizon)
-        work = fresh_work(plan.work_layout, plan.method)
-        run.mode, beyond = choose_mode(compiled.system, plan.parts_so_far, model, run, work, mode)
-        if beyond and model.propagator[run.mode] in (codes.DESINGULARISED, codes.ROOTED):
+        phase0 = memory.begin(model, state, self.tangent, self.t0, self.horizon)
+        run = memory.run
+        index, beyond = choose_mode(compiled.system, plan.parts_so_far, model, run, memory.work, mode)
+        if beyond and model.propagator[index] in (codes.DESINGULARISED, codes.ROOTED):
             # These series hold the root of a guard, which may be negative here.
-            plan = plan_of(compiled, self.solver, tangents, by_steps=int(run.mode))
-            model = model_of(plan)
-            work = fresh_work(plan.work_layout, plan.method)
+            plan.take_back(memory)
+            plan = plan_of(compiled, self.solver, tangents, by_steps=index)
+            memory = plan.memory()
+            model = model_of(plan, memory)
+            memory.begin(model, state, self.tangent, self.t0, self.horizon)
+            choose_mode(compiled.system, plan.parts_so_far, model, memory.run, memory.work, mode)
+        memory.run.mode = index
         most = self.solver.max_steps
-        return Trajectory(compiled, plan, model, run, work, tangents, most, phase0, beyond, self.stop)
+        return Trajectory(compiled, plan, model, memory, tangents, most, phase0, beyond, self.stop)
 
 
 @attrs.frozen(eq=False)
 class Trajectory:
-    """A run that can be advanced. ``run`` and ``work`` are mutated by the kernels; all else is fixed.
+    """A run that can be advanced. Kernels change what is in its ``memory``; all else is fixed.
 
     ``beyond`` names the transitions whose guards the start lies beyond.
     """
@@ -109,13 +117,22 @@ class Trajectory:
     compiled: CompiledSystem
     plan: Plan
     model: Any
-    run: Any
-    work: Any
+    memory: Memory
     tangents: int
     max_steps: int
     phase0: float
     beyond: tuple[str, ...] = ()
     stop: Stop = CTRL_C
+
+    @property
+    def run(self) -> Any:
+        """The state of the run."""
+        return self.memory.run
+
+    @property
+    def work(self) -> Any:
+        """Its scratch memory."""
+        return self.memory.work
 
     @property
     def method(self) -> Any:
@@ -237,23 +254,18 @@ class Trajectory:
 
         With ``orthonormal`` these are orthonormalised whenever they come too close to each other.
         """
-        plan = self.plan
-        changes: dict[str, Any] = {"run": self.run, "work": self.work}
-        if record is not plan.task.record:
+        task = self.memory.task(self.model, orthonormal=orthonormal)
+        changes: dict[str, Any] = {}
+        if record is not task.record:
             changes["record"] = record
         # A run may go on without the tangent vectors that it began with.
-        if self.tangents != plan.task.tangents:
+        if self.tangents != task.tangents:
             changes["tangents"] = self.tangents
-        if self.model is not plan.model:
-            changes["model"] = self.model
-        if orthonormal:
-            changes["orthonormal"] = 1
-        return plan.task.replace(**changes)
+        return task.replace(**changes) if changes else task
 
     def release(self) -> None:
         """Let the next run have the memory of this one, which cannot be advanced or looked at any more."""
-        self.plan.run_layout.take_back(self.run)
-        self.plan.work_layout.take_back(self.work)
+        self.plan.take_back(self.memory)
 
     def no_record(self) -> Any:
         """A record that keeps nothing."""

@@ -25,8 +25,6 @@ from hybrid.kernels.types.kinds import (
     words_of,
 )
 
-# The place of a converter for numbers.
-NUMBER = object()
 CALL = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_char_p)
 # What a word is as a result.
 RESULTS = {
@@ -71,21 +69,26 @@ class Kernel:
 
     def __init__(self, name: str, code: Code, result: str, arguments: list[str]) -> None:
         self.name, self._code, self._result = name, code, result
-        kinds = [kind_named(each) for each in arguments]
-        self._converters = [_converter(f"argument {i} of {name}", kind) for i, kind in enumerate(kinds)]
-        self._table = struct.Struct("".join("d" if kind == REAL else width_of(kind) * "q" for kind in kinds))
+        self._kinds = [kind_named(each) for each in arguments]
 
     def __call__(self, *values: Any) -> Any:
         """Call the kernel; arrays are passed by their addresses."""
-        words: list[Any] = []
-        for value, converter in zip(values, self._converters, strict=True):
-            if converter is None:
-                words.append(value.address)
-            elif converter is NUMBER:
-                words.append(value)
+        return self._read(self._call(self._packed(*values)))
+
+    @cached_property
+    def _packed(self) -> Any:
+        """The table of words as a function of the arguments: one expression, because calls are frequent."""
+        form, words, scope = "", [], dict[str, Any]()
+        for i, kind in enumerate(self._kinds):
+            form += "d" if kind == REAL else width_of(kind) * "q"
+            if isinstance(kind, Array):
+                scope[f"words_{i}"] = words_of(f"argument {i} of {self.name}", kind)
+                words.append(f"*words_{i}(a{i})")
             else:
-                words += converter(value)
-        return self._read(self._call(self._table.pack(*words)))
+                words.append(f"a{i}.address" if kind is None else f"a{i}")
+        scope["pack"] = struct.Struct(form).pack
+        names = ", ".join(f"a{i}" for i in range(len(self._kinds)))
+        return eval(f"lambda {names}: pack({', '.join(words)})", scope)
 
     @cached_property
     def address(self) -> int:
@@ -100,13 +103,6 @@ class Kernel:
     @cached_property
     def _read(self) -> Any:
         return RESULTS[self._result]
-
-
-def _converter(what: str, kind: Any) -> Any:
-    """How an argument becomes words: an address has None, and a number is left to the table."""
-    if kind is None:
-        return None
-    return words_of(what, kind) if isinstance(kind, Array) else NUMBER
 
 
 def file_of(signatures: Mapping[str, list[str]], code: bytes) -> bytes:

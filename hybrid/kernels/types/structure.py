@@ -92,6 +92,12 @@ class Structure:
             raise AttributeError(f"{type(self).__name__}.{name} is fixed; replace({name}=...) makes a copy.")
         object.__setattr__(self, name, value)
 
+    def put(self, **numbers):
+        """Set numbers, between calls of kernels; for an owner who shares the structure with nobody."""
+        for name, value in numbers.items():
+            [self.table[self._places[name]]] = self._words[name](value)
+        self.__dict__.update(numbers)
+
     def replace(self, **changes):
         """A copy with some fields changed."""
         copy, table = object.__new__(type(self)), self.table.copy()
@@ -153,21 +159,21 @@ class Layout:
 
     def zeros(self):
         """A structure whose arrays are zero."""
-        spare = self._spare()
-        if spare is None:
-            return self._structure_in(np.zeros(self.length + LINE, dtype=np.uint8))
-        spare._memory[self._places_of(spare)] = 0
-        return spare
+        structure = self.unwritten()
+        self.clear(structure)
+        return structure
+
+    def clear(self, structure):
+        """Make the arrays of a structure zero."""
+        structure._memory[self._places_of(structure)] = 0
 
     def begin_as(self, structure):
-        """Let all structures from ``fresh`` begin with what the arrays of this one hold now."""
+        """Let ``renew`` give arrays what those of this structure hold now."""
         self.first = structure._memory[self._places_of(structure)].copy()
 
-    def fresh(self):
-        """A structure whose arrays hold what ``begin_as`` was given."""
-        structure = self.unwritten()
+    def renew(self, structure):
+        """Let the arrays of a structure hold what ``begin_as`` was given."""
         structure._memory[self._places_of(structure)] = self.first
-        return structure
 
     def unwritten(self):
         """A structure whose arrays hold what the memory held: for those who write before they read."""
