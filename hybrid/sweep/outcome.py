@@ -112,7 +112,7 @@ def outcome_of(result: Any) -> Outcome:
             values.append(value)
             continue
         column, kind = _column(name, value)
-        signature.append((name, np.shape(column), kind))
+        signature.append((name, getattr(column, "shape", ()), kind))
         values.append(column)
     return Outcome(_schema(tuple(signature)), values, status)
 
