@@ -75,7 +75,7 @@ def test_a_row_leaves_nothing_to_the_next(section):
                 "on",
                 "on",
                 hybrid.Guard(lambda t, x, p: np.sin(x.h) - p.c, 1),
-                lambda t, x, p: (x.h - 0.5, x.s),
+                hybrid.Reset(lambda t, x, p: (x.h - 0.5, x.s)),
             )
         ],
         period=lambda p: 2 * np.pi / p.w,
