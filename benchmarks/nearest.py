@@ -269,14 +269,14 @@ NEAREST = {
     "hybrid/sweep/many.py": ("sweep/test_many_statuses.py",),
     "hybrid/sweep/rows.py": ("sweep/test_many.py", "../lyapunov/test_chart.py"),
     "hybrid/sweep/sheet.py": ("sweep/test_outcome.py", "sweep/test_sweep.py"),
-    "hybrid/symbolic/expressions.py": (
+    "hybrid/expression/expressions.py": (
         "symbolic/test_tracing.py",
         "symbolic/test_derivatives.py",
         "compiler/taylor/test_series.py",
     ),
-    "hybrid/symbolic/tracing.py": ("symbolic/test_tracing.py",),
-    "hybrid/symbolic/ufuncs.py": ("symbolic/test_tracing.py", "compiler/test_operations.py"),
-    "hybrid/symbolic/values.py": ("symbolic/test_tracing.py", "compiler/test_operations.py"),
+    "hybrid/expression/tracing.py": ("symbolic/test_tracing.py",),
+    "hybrid/expression/ufuncs.py": ("symbolic/test_tracing.py", "compiler/test_operations.py"),
+    "hybrid/expression/values.py": ("symbolic/test_tracing.py", "compiler/test_operations.py"),
     "hybrid/system/functions.py": (
         "system/test_derivatives.py",
         "system/test_elements.py",

@@ -30,7 +30,7 @@ PATHS = {
         "hybrid.sweep",
         "hybrid.explorer",
     ),
-    "compile": ("hybrid.system", "hybrid.symbolic", "hybrid.transform", "hybrid.compiler"),
+    "compile": ("hybrid.system", "hybrid.expression", "hybrid.transform", "hybrid.compiler"),
     "run": ("hybrid.simulation", "hybrid.kernels", "hybrid.solvers"),
 }
 LEGEND = {

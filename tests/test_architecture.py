@@ -36,7 +36,7 @@ ROOMS = (
     "hybrid.kernels",
     "hybrid.system",
     "hybrid.status",
-    "hybrid.symbolic",
+    "hybrid.expression",
     "hybrid.solvers",
     "hybrid.transform",
     "hybrid.compiler",

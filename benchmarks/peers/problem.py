@@ -10,8 +10,8 @@ import numpy as np
 import sympy
 
 from hybrid import Answer, HybridSystem
-from hybrid.symbolic import expressions as sym
-from hybrid.symbolic.tracing import model_symbols, trace
+from hybrid.expression import expressions as sym
+from hybrid.expression.tracing import model_symbols, trace
 
 # Ratio of absolute to relative tolerance, the same for all.
 ATOL_OVER_RTOL = 1e-2

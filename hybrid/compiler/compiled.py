@@ -437,7 +437,7 @@ def emitted_of(system: HybridSystem) -> Emitted:
     found = None if operations is None else store.read(operations)
     if found is not None:
         return found
-    # SymPy is imported only now.
+    # What traces is imported only now.
     from hybrid.compiler.emit import emit
 
     emitted = emit(system)

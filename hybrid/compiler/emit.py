@@ -16,7 +16,6 @@ from itertools import accumulate
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import attrs
-import sympy
 
 from hybrid.compiler.bounds.forcing import forcings
 from hybrid.compiler.bounds.program import programs
@@ -35,15 +34,16 @@ from hybrid.compiler.surfaces import surfaces
 from hybrid.compiler.taylor.loops import padded
 from hybrid.compiler.written import Written, beyond_guards, variational
 from hybrid.errors import ModelError
+from hybrid.expression.code import IMPORTS, assignments, unprintable
+from hybrid.expression.continuity import jumps_of, may_be_abrupt, may_jump
+from hybrid.expression.derivatives import jacobian_of
+from hybrid.expression.graph import forget, nodes_of
+from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol, node
+from hybrid.expression.operations import JUMPING
+from hybrid.expression.periodicity import is_periodic
+from hybrid.expression.signs import simplified
+from hybrid.expression.tracing import Symbols, TraceError, model_symbols, trace
 from hybrid.kernels.types.codes import WIDE
-from hybrid.symbolic.continuity import jumps_of, may_be_abrupt, may_jump
-from hybrid.symbolic.derivatives import jacobian_of
-from hybrid.symbolic.expressions import JUMPING, ONE, ZERO
-from hybrid.symbolic.nodes import forget, nodes_of
-from hybrid.symbolic.periodicity import is_periodic
-from hybrid.symbolic.printer import IMPORTS, assignments, unprintable
-from hybrid.symbolic.signs import simplified
-from hybrid.symbolic.tracing import Symbols, TraceError, model_symbols, trace
 from hybrid.system.checks import derivative_has_time_column
 from hybrid.system.derivatives import complex_step_error
 from hybrid.system.functions import (
@@ -297,12 +297,11 @@ class _Writer:
             [value] = self.traced(function.value)
         except ModelError as reason:
             return Written(self._opaque_value(function, ["out[0]"], reason), [])
-        # It is evaluated at crossings only, so it is not worth a long search for common parts.
-        return Written(assignments(["out[0]"], [value], thorough=False), [], [value])
+        return Written(assignments(["out[0]"], [value]), [], [value])
 
-    def surfaces(self, traced: Sequence[sympy.Expr | None]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    def surfaces(self, traced: Sequence[Expression | None]) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """The zero sets of all guards, as `hybrid.compiler.surfaces.surfaces` numbers them."""
-        scaled = self.remembered("surfaces", dict[sympy.Expr, Any])
+        scaled = self.remembered("surfaces", dict[Expression, Any])
         return surfaces([each.guard.function for each in self.system.transitions], traced, scaled)
 
     def identity(self) -> Written:
@@ -316,7 +315,7 @@ class _Writer:
         entries = [ONE if i == j else ZERO for i in range(n) for j in range(n + 1)]
         return Written(value, assignments(cells, entries), [*self.symbols.x])
 
-    def traced(self, function: Callable[..., Any]) -> list[sympy.Expr]:
+    def traced(self, function: Callable[..., Any]) -> list[Expression]:
         """Expressions of a function; ModelError if it has none that can be compiled."""
         expressions = trace(function, self.system.state, tuple(self.system.parameters))
         _check_printable(expressions)
@@ -393,7 +392,7 @@ class _Writer:
         return name
 
 
-def _check_printable(expressions: Iterable[sympy.Expr]) -> None:
+def _check_printable(expressions: Iterable[Expression]) -> None:
     missing = unprintable(expressions)
     if missing is not None:
         raise TraceError(f"the function {missing} has no compiled form")
@@ -420,7 +419,7 @@ def _boundaries(
 
 def _gradients(
     system: HybridSystem, mode: str, guards: Sequence[Written]
-) -> list[Sequence[sympy.Expr] | None]:
+) -> list[Sequence[Expression] | None]:
     """The gradients of the guards in a mode; None for one that is not traced."""
     pairs = zip(system.transitions, guards, strict=True)
     written = [guard for transition, guard in pairs if transition.source == mode]
@@ -440,7 +439,7 @@ def _where_it_jumps(
     return ", or ".join(_in_names(system, place) for place in places)
 
 
-def _told(system: HybridSystem, expressions: Sequence[sympy.Expr]) -> str:
+def _told(system: HybridSystem, expressions: Sequence[Expression]) -> str:
     """Expressions in the names of the model."""
     text = ", ".join(_in_names(system, str(each)) for each in expressions)
     return _CLASSES.sub(lambda match: _WRITTEN[match[0]], text)
@@ -464,7 +463,7 @@ def _has_proved_period(system: HybridSystem, written: Iterable[Written], writer:
         except ModelError:
             return False
     return all(
-        each.expressions is not None and is_periodic(each.expressions, symbols.t, sympy.sympify(period))
+        each.expressions is not None and is_periodic(each.expressions, symbols.t, node(period))
         for each in written
     )
 
@@ -488,7 +487,7 @@ def _written_condition(writer: _Writer, transition: Transition) -> Written:
     return Written([], [], []) if function is None else writer.condition(function)
 
 
-def _is_affine(written: Written, variables: Sequence[sympy.Symbol]) -> bool:
+def _is_affine(written: Written, variables: Sequence[Symbol]) -> bool:
     """Whether the derivative in the variables, which come first, is proved to depend on none of them."""
     if written.expressions is None or written.jacobian is None:
         return False

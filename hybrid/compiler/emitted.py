@@ -1,4 +1,4 @@
-"""The facts and the code that tracing found for a system; plain data, without SymPy."""
+"""The facts and the code that tracing found for a system; plain data."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from hybrid.symbolic.values import TraceError, values_of
+from hybrid.expression.values import TraceError, values_of
 from hybrid.system.functions import ModelFunction
 from hybrid.system.graph import HybridSystem, functions_of
 
@@ -35,7 +35,7 @@ class Operations:
         return self.listed(name, *contents)
 
     def expression(self, content: int) -> Any:
-        """A function that asks for expressions is to be traced by SymPy each time."""
+        """A function that asks for expressions is to be traced each time."""
         raise TraceError("there is no expression where operations are only listed")
 
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-import sympy
-
 from hybrid.compiler.written import Written
+from hybrid.expression.graph import mentions, symbols_of
+from hybrid.expression.nodes import Expression, Symbol
+from hybrid.expression.tracing import Symbols
 from hybrid.kernels.types.codes import BY_FLOW, BY_GUARD, BY_NOTHING
-from hybrid.symbolic.nodes import mentions, nodes
-from hybrid.symbolic.tracing import Symbols
 from hybrid.system.graph import HybridSystem
 
 
@@ -53,18 +52,16 @@ def _in_mode(
     return tuple(map(reader, places))
 
 
-def _symbols_in(functions: Iterable[Written], row: int | None = None) -> set[sympy.Symbol] | None:
+def _symbols_in(functions: Iterable[Written], row: int | None = None) -> set[Symbol] | None:
     """The symbols in functions, or in one row of each; None if one could not be traced."""
-    found: set[sympy.Symbol] = set()
+    found: set[Symbol] = set()
     for each in functions:
         if each.expressions is None:
             return None
-        for expression in each.expressions if row is None else each.expressions[row : row + 1]:
-            # Each node once: an expression may use its results many times over.
-            found |= {node for node in nodes(expression) if node.is_Symbol}
+        found |= symbols_of(*(each.expressions if row is None else each.expressions[row : row + 1]))
     return found
 
 
-def is_free(expressions: Iterable[sympy.Expr] | None, variables: Sequence[sympy.Symbol]) -> bool:
+def is_free(expressions: Iterable[Expression] | None, variables: Sequence[Symbol]) -> bool:
     """Whether expressions are known, and depend on none of the variables."""
     return expressions is not None and not any(mentions(expression, variables) for expression in expressions)

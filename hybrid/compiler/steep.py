@@ -9,15 +9,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import sympy
-
 from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.taylor.roots import is_multiple
 from hybrid.compiler.written import Written, beyond_guards
-from hybrid.kernels.types.codes import NO_MODE
-from hybrid.symbolic.expressions import (
-    ONE,
-    ZERO,
+from hybrid.expression.code import assignments
+from hybrid.expression.graph import all_replaced, contains, mentions, nodes_of, replaced
+from hybrid.expression.nodes import ONE, ZERO, Expression, Power, is_whole, order_of
+from hybrid.expression.operations import (
     Absolute,
     CubeRoot,
     Less,
@@ -27,10 +25,9 @@ from hybrid.symbolic.expressions import (
     Sign,
     Step,
 )
-from hybrid.symbolic.nodes import contains, mentions, nodes_of, replaced
-from hybrid.symbolic.printer import assignments
-from hybrid.symbolic.signs import simplified
-from hybrid.symbolic.tracing import Symbols
+from hybrid.expression.signs import simplified
+from hybrid.expression.tracing import Symbols
+from hybrid.kernels.types.codes import NO_MODE
 
 if TYPE_CHECKING:
     from hybrid.system.graph import HybridSystem
@@ -38,24 +35,24 @@ if TYPE_CHECKING:
 SWITCHES = (Absolute, Maximum, Minimum, Sign, Step, Select)
 
 
-def steep_powers(expressions: Sequence[sympy.Expr], symbols: Symbols) -> list[sympy.Expr]:
+def steep_powers(expressions: Sequence[Expression], symbols: Symbols) -> list[Expression]:
     """The powers that may have an infinite slope where their base is zero; also those of parameters."""
-    found = nodes_of((sympy.Pow, CubeRoot), *expressions)
-    return sorted((node for node in found if _is_steep(node, symbols)), key=sympy.default_sort_key)
+    found = nodes_of((Power, CubeRoot), *expressions)
+    return sorted((node for node in found if _is_steep(node, symbols)), key=order_of)
 
 
-def _is_steep(node: sympy.Expr, symbols: Symbols) -> bool:
+def _is_steep(node: Expression, symbols: Symbols) -> bool:
     if not mentions(node.args[0], symbols.variables):
         return False
     if isinstance(node, CubeRoot):
         return True
-    exponent = node.exp
-    return not exponent.is_Integer and not (exponent.is_number and not 0 < exponent < 1)
+    exponent = node.exponent
+    return not is_whole(exponent) and not (exponent.is_number and not 0 < exponent.value < 1)
 
 
 def steep_at_guards(
-    expressions: Sequence[sympy.Expr] | None, boundaries: Sequence[Boundary], symbols: Symbols
-) -> list[sympy.Expr]:
+    expressions: Sequence[Expression] | None, boundaries: Sequence[Boundary], symbols: Symbols
+) -> list[Expression]:
     """The steep powers of the guards at which a mode ends."""
     known = known_positive(boundaries)
     return [
@@ -66,8 +63,8 @@ def steep_at_guards(
 
 
 def steep_inside(
-    expressions: Sequence[sympy.Expr] | None, boundaries: Sequence[Boundary], symbols: Symbols
-) -> list[sympy.Expr]:
+    expressions: Sequence[Expression] | None, boundaries: Sequence[Boundary], symbols: Symbols
+) -> list[Expression]:
     """The steep powers of what switches inside of a mode, such as ``abs(v)**0.5``."""
     known = known_positive(boundaries)
     found = []
@@ -75,7 +72,7 @@ def steep_inside(
         base = simplified(node.args[0], known)
         if any(is_multiple(base, guard, symbols) for guard in known):
             continue
-        if isinstance(node, CubeRoot) or (contains(base, SWITCHES) and node.exp.is_number):
+        if isinstance(node, CubeRoot) or (contains(base, SWITCHES) and node.exponent.is_number):
             found.append(node)
     return found
 
@@ -83,7 +80,7 @@ def steep_inside(
 def fields_at_crossings(
     system: HybridSystem,
     fields: Sequence[Written],
-    steep: Sequence[Sequence[sympy.Expr]],
+    steep: Sequence[Sequence[Expression]],
     guards: Sequence[Written],
     resets: Sequence[Written],
     boundaries: Sequence[Sequence[Boundary]],
@@ -96,7 +93,7 @@ def fields_at_crossings(
     """
     numbers, bodies = [], list[list[str]]()
 
-    def number_of(mode: str | None, guard: Written, states: Sequence[sympy.Expr] | None) -> int:
+    def number_of(mode: str | None, guard: Written, states: Sequence[Expression] | None) -> int:
         if mode is None:
             return NO_MODE
         index = system.mode_index(mode)
@@ -107,7 +104,7 @@ def fields_at_crossings(
         zeros = _zeros(steep[index], guard.expressions[0], moved, known, symbols)
         if not zeros:
             return index
-        left = [replaced(each, zeros) for each in expressions]
+        left = all_replaced(expressions, zeros)
         value = assignments([f"out[{i}]" for i in range(len(left))], left)
         bodies.append(beyond_guards(Written(value, [], left, [], True), boundaries[index], symbols).value)
         return len(fields) + len(bodies) - 1
@@ -119,19 +116,19 @@ def fields_at_crossings(
 
 
 def _zeros(
-    steep: Sequence[sympy.Expr],
-    guard: sympy.Expr,
-    moved: Mapping[sympy.Expr, sympy.Expr],
-    known: Sequence[sympy.Expr],
+    steep: Sequence[Expression],
+    guard: Expression,
+    moved: Mapping[Expression, Expression],
+    known: Sequence[Expression],
     symbols: Symbols,
-) -> dict[sympy.Expr, sympy.Expr]:
+) -> dict[Expression, Expression]:
     """The steep powers that are zero where a guard is, and their values.
 
     ``moved`` are the states in terms of those at which the guard is evaluated: a reset may lie between.
     """
-    zeros: dict[sympy.Expr, sympy.Expr] = {}
+    zeros: dict[Expression, Expression] = {}
     for node in steep:
         if is_multiple(replaced(simplified(node.args[0], known), moved), guard, symbols):
-            exponent = ONE if isinstance(node, CubeRoot) else node.exp
+            exponent = ONE if isinstance(node, CubeRoot) else node.exponent
             zeros[node] = ZERO if exponent.is_number else Select(Less(ZERO, exponent), ZERO, node)
     return zeros

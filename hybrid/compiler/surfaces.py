@@ -5,23 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    import sympy
+from hybrid.expression.graph import is_larger_than
+from hybrid.expression.nodes import Expression, order_of, split, terms_of
+from hybrid.expression.polynomials import coefficients_of
 
+if TYPE_CHECKING:
     from hybrid.compiler.emitted import Emitted
     from hybrid.system.graph import HybridSystem
 
-# Expressions with more terms are not expanded; expressions with more nodes are compared as a whole.
+# Expressions with more terms are not expanded.
 MOST_TERMS = 200
-MOST_SHOWN = 5000
 # Digits to which quotients of coefficients are compared.
 DIGITS = 12
 
 
 def surfaces(
     functions: Iterable[Callable[..., Any]],
-    expressions: Iterable[sympy.Expr | None],
-    scaled: dict[sympy.Expr, tuple[Any, int]],
+    expressions: Iterable[Expression | None],
+    scaled: dict[Expression, tuple[Any, int]],
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """The number of the zero set of each guard, and the sign of the guard's factor.
 
@@ -40,24 +41,21 @@ def surfaces(
     return tuple(numbers), tuple(signs)
 
 
-def _without_factor(expression: sympy.Expr) -> tuple[Any, int]:
+def _without_factor(expression: Expression) -> tuple[Any, int]:
     """An expression divided by its leading coefficient, and the sign of that coefficient.
 
     None instead if it is a constant.
     """
-    from hybrid.symbolic.nodes import is_larger_than, symbols_of
-
-    if not symbols_of(expression):
+    if not expression.mask:
         return None, 1
-    if is_larger_than(MOST_SHOWN, expression):
-        # The expression itself: expanding it would take too long.
-        return expression, 1
-    if not is_larger_than(MOST_TERMS, expression):
-        expression = expression.expand()
-    coefficients = expression.as_coefficients_dict()
-    terms = sorted((str(term), float(factor)) for term, factor in coefficients.items())
-    leading = terms[0][1]
-    scaled = tuple((term, f"{factor / leading:.{DIGITS}e}") for term, factor in terms)
+    if is_larger_than(MOST_TERMS, expression):
+        # Expanding it would take too long.
+        coefficients = {rest: factor for factor, rest in map(split, terms_of(expression))}
+    else:
+        coefficients = dict(coefficients_of(expression))
+    terms = sorted(coefficients, key=order_of)
+    leading = float(coefficients[terms[0]])
+    scaled = tuple((term, f"{float(coefficients[term]) / leading:.{DIGITS}e}") for term in terms)
     return scaled, 1 if leading > 0.0 else -1
 
 

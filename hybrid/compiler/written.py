@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import attrs
-import sympy
 
 from hybrid.compiler.jacobians import CELL
 from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.taylor.roots import is_multiple
-from hybrid.symbolic.expressions import ZERO, CubeRoot, Less, Maximum, Select
-from hybrid.symbolic.nodes import mentions, nodes_of, replaced
-from hybrid.symbolic.printer import assignments
-from hybrid.symbolic.signs import simplified
-from hybrid.symbolic.tracing import Symbols
+from hybrid.expression.code import assignments
+from hybrid.expression.graph import all_replaced, mentions, nodes_of
+from hybrid.expression.nodes import ZERO, Expression, Power, is_negative, is_positive, is_whole, power
+from hybrid.expression.operations import CubeRoot, Less, Maximum, Select
+from hybrid.expression.polynomials import ratio
+from hybrid.expression.signs import simplified
+from hybrid.expression.tracing import Symbols
 
 
 @attrs.frozen
@@ -23,8 +24,8 @@ class Written:
 
     value: list[str]
     derivative: list[str]
-    expressions: list[sympy.Expr] | None = None
-    jacobian: list[list[sympy.Expr]] | None = None
+    expressions: list[Expression] | None = None
+    jacobian: list[list[Expression]] | None = None
     given: bool = False
 
 
@@ -43,9 +44,9 @@ def beyond_guards(field: Written, boundaries: Sequence[Boundary], symbols: Symbo
     if not roots and not slopes:
         return field
     slopes = _roots_inside(entries, known, symbols) | slopes
-    expressions = [replaced(entry, roots) for entry in field.expressions]
-    jacobian = [[replaced(entry, slopes) for entry in row] for row in field.jacobian]
-    n, derivative = len(symbols.x), field.derivative
+    n, derivative, expressions = len(symbols.x), field.derivative, all_replaced(field.expressions, roots)
+    flat = all_replaced(entries, slopes)
+    jacobian = [flat[i * (n + 1) : (i + 1) * (n + 1)] for i in range(n)]
     if not field.given:
         cells = [f"out[{i}, {j}]" for i in range(n) for j in range(n + 1)]
         derivative = assignments(cells, [entry for row in jacobian for entry in row])
@@ -54,37 +55,40 @@ def beyond_guards(field: Written, boundaries: Sequence[Boundary], symbols: Symbo
 
 
 def _roots_inside(
-    expressions: Sequence[sympy.Expr], known: Sequence[sympy.Expr], symbols: Symbols
-) -> dict[sympy.Expr, sympy.Expr]:
+    expressions: Sequence[Expression], known: Sequence[Expression], symbols: Symbols
+) -> dict[Expression, Expression]:
     """Fractional powers of what is never negative in the mode, and what takes their place."""
     found = {}
-    for power in nodes_of(sympy.Pow, *expressions):
-        if power.exp.is_Integer or not mentions(power.base, symbols.variables):
+    for root in nodes_of(Power, *expressions):
+        base, exponent = root.args
+        if is_whole(exponent) or not mentions(base, symbols.variables):
             continue
         for guard in known:
-            if is_multiple(power.base, guard, symbols):
-                factor, extended = sympy.cancel(power.base / guard), Maximum(power.base, ZERO)
-                if factor.is_Number and factor.is_positive:
-                    found[power] = extended**power.exp
-                elif not factor.is_Number:
-                    # With a negative factor the root has no value inside the mode, which must show.
-                    found[power] = Select(Less(ZERO, factor), extended, power.base) ** power.exp
-                break
+            factor = ratio(base, guard, symbols.variables)
+            if factor is None:
+                continue
+            extended = Maximum(base, ZERO)
+            if not factor.is_number:
+                # With a negative factor the root has no value inside the mode, which must show.
+                extended = Select(Less(ZERO, factor), extended, base)
+            if not is_negative(factor):
+                found[root] = power(extended, exponent)
+            break
     return found
 
 
 def _slopes_inside(
-    entries: Sequence[sympy.Expr], known: Sequence[sympy.Expr], symbols: Symbols
-) -> dict[sympy.Expr, sympy.Expr]:
+    entries: Sequence[Expression], known: Sequence[Expression], symbols: Symbols
+) -> dict[Expression, Expression]:
     """Powers of the guards that may be infinite there, and what takes their place: zero at the guard."""
-    found: dict[sympy.Expr, sympy.Expr] = {}
-    for power in nodes_of(sympy.Pow, *entries):
-        if power.exp.is_positive or not mentions(power.base, symbols.variables):
+    found: dict[Expression, Expression] = {}
+    for each in nodes_of(Power, *entries):
+        if is_positive(each.exponent) or not mentions(each.base, symbols.variables):
             continue
-        base = power.base.args[0] if isinstance(power.base, CubeRoot) else power.base
+        base = each.base.args[0] if isinstance(each.base, CubeRoot) else each.base
         base = simplified(base, known)
         if any(is_multiple(base, guard, symbols) for guard in known):
-            found[power] = Select(Less(ZERO, base), power, ZERO)
+            found[each] = Select(Less(ZERO, base), each, ZERO)
     return found
 
 

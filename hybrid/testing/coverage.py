@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import attrs
 import numpy as np
 
+from hybrid.expression.reads import names_read
+from hybrid.expression.values import TraceError
 from hybrid.simulation.arc import HybridArc
 from hybrid.status import StatusCode
-from hybrid.symbolic.reads import names_read
-from hybrid.symbolic.values import TraceError
 from hybrid.system.derivatives import evaluate
 from hybrid.system.elements import Function, Guard, Mode, Transition
 from hybrid.system.graph import HybridSystem

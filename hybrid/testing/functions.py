@@ -10,8 +10,8 @@ import numpy as np
 
 from hybrid.compiler.agreement import disagreement
 from hybrid.compiler.compiled import compile_system
-from hybrid.symbolic.reads import TIME, names_read
-from hybrid.symbolic.values import TraceError
+from hybrid.expression.reads import TIME, names_read
+from hybrid.expression.values import TraceError
 from hybrid.system.graph import HybridSystem, functions_of
 from hybrid.system.periodicity import angle_fault_at, period_at, period_fault_at
 from hybrid.system.watched import is_of_library

@@ -8,8 +8,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from hybrid.symbolic.reads import TIME, names_read
-from hybrid.symbolic.values import TraceError
+from hybrid.expression.reads import TIME, names_read
+from hybrid.expression.values import TraceError
 from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Reset, Transition
 from hybrid.system.functions import WholeReset

@@ -11,20 +11,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import product
 
-import sympy
-from sympy.core.parameters import distribute
+from hybrid.expression.nodes import HALF, MINUS_ONE, ZERO, Expression, add, power
+from hybrid.expression.polynomials import expanded, is_zero
 
-from hybrid.symbolic.expressions import HALF, ONE, ZERO, power
-from hybrid.symbolic.nodes import expanded
-
-Field = list[sympy.Expr]
-Matrix = list[list[sympy.Expr]]
+Field = list[Expression]
+Matrix = list[list[Expression]]
 
 
 def sliding_field(
-    vertex_field: Callable[[Mapping[int, int]], Sequence[sympy.Expr]],
+    vertex_field: Callable[[Mapping[int, int]], Sequence[Expression]],
     on: Sequence[int],
-    gradients: Sequence[Sequence[sympy.Expr]],
+    gradients: Sequence[Sequence[Expression]],
 ) -> Field | None:
     """The field along which all heights stay; None where jumps do not add up, or the shares are not unique.
 
@@ -41,22 +38,21 @@ def sliding_field(
     if parts is None:
         return None
     middle, halves = parts
-    with distribute(False):
-        rates = [_along(normal, middle) + own for *normal, own in gradients]
-        matrix = [[_along(normal, half) for half in halves] for *normal, _ in gradients]
-        shares = _solved(matrix, [-rate for rate in rates])
-        if shares is None:
-            return None
-        field = [
-            entry + _sum(share * half[i] for share, half in zip(shares, halves, strict=True) if half[i] != 0)
-            for i, entry in enumerate(middle)
-        ]
+    rates = [_along(normal, middle) + own for *normal, own in gradients]
+    matrix = [[_along(normal, half) for half in halves] for *normal, _ in gradients]
+    shares = _solved(matrix, [-rate for rate in rates])
+    if shares is None:
+        return None
+    field = [
+        entry + _sum(share * half[i] for share, half in zip(shares, halves, strict=True))
+        for i, entry in enumerate(middle)
+    ]
     # A state that stays where it is must have the rate 0, not what is left by rounding.
-    return [ZERO if expanded(entry) == 0 else entry for entry in field]
+    return [ZERO if is_zero(entry) else entry for entry in field]
 
 
 def _parts(
-    vertex_field: Callable[[Mapping[int, int]], Sequence[sympy.Expr]], on: Sequence[int]
+    vertex_field: Callable[[Mapping[int, int]], Sequence[Expression]], on: Sequence[int]
 ) -> tuple[Field, list[Field]] | None:
     """The field midway between all sides, and half the jump across each surface.
 
@@ -72,17 +68,17 @@ def _parts(
         corner = vertex_field({number: 2 * sign for number, sign in zip(on, signs, strict=True)})
         for i, entry in enumerate(corner):
             added = middle[i] + _sum(sign * half[i] for sign, half in zip(signs, halves, strict=True))
-            if expanded(entry - added) != 0:
+            if not is_zero(entry - added):
                 return None
     return middle, halves
 
 
-def _along(normal: Sequence[sympy.Expr], field: Field) -> sympy.Expr:
-    return _sum(slope * rate for slope, rate in zip(normal, field, strict=True) if slope != 0 and rate != 0)
+def _along(normal: Sequence[Expression], field: Field) -> Expression:
+    return _sum(slope * rate for slope, rate in zip(normal, field, strict=True))
 
 
-def _sum(terms: Iterable[sympy.Expr]) -> sympy.Expr:
-    return sympy.Add(*terms)
+def _sum(terms: Iterable[Expression]) -> Expression:
+    return add(*terms)
 
 
 def _solved(matrix: Matrix, right: Field) -> Field | None:
@@ -91,17 +87,17 @@ def _solved(matrix: Matrix, right: Field) -> Field | None:
     size = len(rows)
     for k in range(size):
         # A row with few entries keeps expressions small: mostly each surface has a contact of its own.
-        usable = [i for i in range(k, size) if expanded(rows[i][k]) != 0]
+        usable = [i for i in range(k, size) if not is_zero(rows[i][k])]
         if not usable:
             return None
-        best = min(usable, key=lambda i: sum(entry != 0 for entry in rows[i][:size]))
+        best = min(usable, key=lambda i: sum(entry is not ZERO for entry in rows[i][:size]))
         rows[k], rows[best] = rows[best], rows[k]
         pivot = rows[k]
         for i in range(size):
-            if i != k and rows[i][k] != 0:
-                factor = rows[i][k] * power(pivot[k], -ONE)
+            if i != k and rows[i][k] is not ZERO:
+                factor = rows[i][k] * power(pivot[k], MINUS_ONE)
                 rows[i] = [
-                    ZERO if j == k else entry - factor * pivot[j] if pivot[j] != 0 else entry
+                    ZERO if j == k else entry - factor * pivot[j]
                     for j, entry in enumerate(rows[i])
                 ]
-    return [rows[k][size] * power(rows[k][k], -ONE) for k in range(size)]
+    return [rows[k][size] * power(rows[k][k], MINUS_ONE) for k in range(size)]

@@ -11,15 +11,14 @@ from itertools import product
 from typing import Any
 
 import attrs
-import sympy
-from sympy.core.parameters import distribute
 
-from hybrid.symbolic.continuity import vanishes_on
-from hybrid.symbolic.derivatives import jacobian_of
-from hybrid.symbolic.evaluation import expressed, scalar
-from hybrid.symbolic.expressions import HALF, ZERO, power
-from hybrid.symbolic.nodes import nodes_of, replaced
-from hybrid.symbolic.switches import Surfaces, Switches
+from hybrid.expression.continuity import vanishes_on
+from hybrid.expression.derivatives import jacobian_of
+from hybrid.expression.evaluation import expressed, scalar
+from hybrid.expression.graph import all_replaced, nodes_of
+from hybrid.expression.nodes import HALF, ZERO, Expression, Power, add, power
+from hybrid.expression.polynomials import is_zero
+from hybrid.expression.switches import Surfaces, Switches
 from hybrid.system.elements import Function
 from hybrid.system.variables import Variables
 from hybrid.transform import additive
@@ -90,8 +89,8 @@ class Shares:
     """
 
     flow: Function
-    of: dict[int, sympy.Expr]
-    unique: sympy.Expr
+    of: dict[int, Expression]
+    unique: Expression
 
 
 class Pieces:
@@ -108,8 +107,8 @@ class Pieces:
     def __init__(
         self,
         mode: int,
-        field: Sequence[sympy.Expr],
-        watched: Sequence[sympy.Expr],
+        field: Sequence[Expression],
+        watched: Sequence[Expression],
         variables: Variables,
         surfaces: Surfaces,
     ) -> None:
@@ -182,7 +181,7 @@ class Pieces:
         """Whether some sides follow from others."""
         return all(sides.get(k) == s or self.surfaces.implied(k, sides) == s for k, s in wanted.items())
 
-    def _entries(self, sides: Sides) -> list[tuple[sympy.Expr, ...]]:
+    def _entries(self, sides: Sides) -> list[tuple[Expression, ...]]:
         """Every function with the branches of some sides, at each vertex of a sliding cell."""
         return [tuple(self._resolved(vertex)) for vertex in _vertices(sides)]
 
@@ -224,15 +223,15 @@ class Pieces:
         field = self._additive_field(sides, on)
         return self.between(sides, on[-1]).sliding_field if field is None else expressed(field)
 
-    def _additive_field(self, sides: Sides, on: Sequence[int]) -> list[sympy.Expr] | None:
+    def _additive_field(self, sides: Sides, on: Sequence[int]) -> list[Expression] | None:
         symbols, known = self.surfaces.symbols, self.surfaces.known
         gradients = jacobian_of([known[number].height for number in on], symbols.variables)
         return additive.sliding_field(lambda own: self._vertex_field({**sides, **own}), on, gradients)
 
-    def _vertex_field(self, sides: Sides) -> list[sympy.Expr]:
+    def _vertex_field(self, sides: Sides) -> list[Expression]:
         return self._resolved(sides)[: self.size]
 
-    def _resolved(self, sides: Sides) -> list[sympy.Expr]:
+    def _resolved(self, sides: Sides) -> list[Expression]:
         result = self.switches.resolved(sides)
         assert not isinstance(result, int), "the side of a surface is missing"
         return [*result.entries]
@@ -257,7 +256,7 @@ class Pieces:
         """Whether the speeds through a surface may differ on its two sides."""
         [normal] = jacobian_of([self.surfaces.known[number].height], self.surfaces.symbols.x)
         return any(
-            sympy.Add(*(slope * change for slope, change in zip(normal, changes, strict=True))).expand() != 0
+            not is_zero(add(*(slope * change for slope, change in zip(normal, changes, strict=True))))
             for changes in self.changes(sides, number)
         )
 
@@ -280,30 +279,31 @@ class Pieces:
         [[*normal, own]] = jacobian_of([height], self.surfaces.symbols.variables)
         for side in (-2, 2):
             field = self._vertex_field({**sides, number: side})
-            speed = sympy.Add(own, *(slope * rate for slope, rate in zip(normal, field, strict=True)))
+            speed = add(own, *(slope * rate for slope, rate in zip(normal, field, strict=True)))
             if not self._roots(speed, number) or not vanishes_on(speed, height):
                 return False
         return True
 
-    def _roots(self, expression: sympy.Expr, number: int) -> list[sympy.Expr]:
+    def _roots(self, expression: Expression, number: int) -> list[Expression]:
         """Roots in an expression whose slope is infinite on a surface."""
         height = self.surfaces.known[number].height
         return [
             each
-            for each in nodes_of(sympy.Pow, expression)
-            if each.exp.is_number and 0 < each.exp < 1 and vanishes_on(each.base, height)
+            for each in nodes_of(Power, expression)
+            if each.exponent.is_number and 0 < each.exponent.value < 1 and vanishes_on(each.base, height)
         ]
 
-    def _held(self, field: Sequence[sympy.Expr], number: int) -> list[sympy.Expr]:
+    def _held(self, field: Sequence[Expression], number: int) -> list[Expression]:
         """A field on a surface: roots of the height are zero, whatever rounding leaves of the height."""
-        return [replaced(entry, dict.fromkeys(self._roots(entry, number), ZERO)) for entry in field]
+        roots = [root for entry in field for root in self._roots(entry, number)]
+        return all_replaced(field, dict.fromkeys(roots, ZERO))
 
-    def _bare_field(self, sides: Sides) -> list[sympy.Expr]:
+    def _bare_field(self, sides: Sides) -> list[Expression]:
         result = self.switches.resolved(sides)
         assert not isinstance(result, int), "the side of a surface is missing"
         return [*result.bare[: self.size]]
 
-    def changes(self, sides: Sides, number: int) -> Iterator[list[sympy.Expr]]:
+    def changes(self, sides: Sides, number: int) -> Iterator[list[Expression]]:
         """The change of the field from below a surface to above it, at each vertex of the other sides."""
         for vertex in _vertices(sides, besides=number):
             below, above = (self._bare_field({**vertex, number: side}) for side in (-2, 2))
@@ -336,45 +336,43 @@ class Pieces:
         corners = {
             (i, j): self._vertex_field({**sides, one: i, other: j}) for i, j in product((-2, 2), repeat=2)
         }
-        with distribute(False):
-            field = [_coefficients(*each) for each in zip(*corners.values(), strict=True)]
-            speeds = []
-            for number in (one, other):
-                # The rate of the height is linear in the field: its coefficients are the rates along theirs.
-                [[*normal, own]] = jacobian_of([self.surfaces.known[number].height], symbols.variables)
-                rates = [
-                    sum((slope * each[k] for slope, each in zip(normal, field, strict=True)), ZERO)
-                    for k in range(4)
-                ]
-                speeds.append([rates[0] + own, *rates[1:]])
-            (p0, p1, p2, p3), (q0, q1, q2, q3) = speeds
-            square, linear, constant = (
-                q2 * p3 - q3 * p2,
-                q0 * p3 + q2 * p1 - q1 * p2 - q3 * p0,
-                q0 * p1 - q1 * p0,
+        field = [_coefficients(*each) for each in zip(*corners.values(), strict=True)]
+        speeds = []
+        for number in (one, other):
+            # The rate of the height is linear in the field: its coefficients are the rates along theirs.
+            [[*normal, own]] = jacobian_of([self.surfaces.known[number].height], symbols.variables)
+            rates = [
+                sum((slope * each[k] for slope, each in zip(normal, field, strict=True)), ZERO)
+                for k in range(4)
+            ]
+            speeds.append([rates[0] + own, *rates[1:]])
+        (p0, p1, p2, p3), (q0, q1, q2, q3) = speeds
+        square, linear, constant = (
+            q2 * p3 - q3 * p2,
+            q0 * p3 + q2 * p1 - q1 * p2 - q3 * p0,
+            q0 * p1 - q1 * p0,
+        )
+        if is_zero(square):
+            b, unique = -constant / linear, linear
+        else:
+            root = power(linear**2 - 4 * square * constant, HALF)
+            # Both quotients of the quadratic formula, each weighted with its denominator: no sign of a
+            # coefficient makes terms cancel, and the square may vanish.
+            b = (2 * square * (root - linear) - 2 * constant * (root + linear)) / (
+                4 * square**2 + (root + linear) ** 2
             )
-            if square.expand() == 0:
-                b, unique = -constant / linear, linear
-            else:
-                root = power(linear**2 - 4 * square * constant, HALF)
-                # Both quotients of the quadratic formula, each weighted with its denominator: no sign of a
-                # coefficient makes terms cancel, and the square may vanish.
-                b = (2 * square * (root - linear) - 2 * constant * (root + linear)) / (
-                    4 * square**2 + (root + linear) ** 2
-                )
-                unique = root**2 - FOLD * (linear**2 + square**2)
-            # Both rates give the same share; one of them may not depend on it.
-            p, q = p1 + p3 * b, q1 + q3 * b
-            a = -((p0 + p2 * b) * p + (q0 + q2 * b) * q) / (p**2 + q**2)
-            flow = expressed([c0 + c1 * a + c2 * b + c3 * (a * b) for c0, c1, c2, c3 in field])
-            return Shares(flow, {one: a, other: b}, unique)
+            unique = root**2 - FOLD * (linear**2 + square**2)
+        # Both rates give the same share; one of them may not depend on it.
+        p, q = p1 + p3 * b, q1 + q3 * b
+        a = -((p0 + p2 * b) * p + (q0 + q2 * b) * q) / (p**2 + q**2)
+        flow = expressed([c0 + c1 * a + c2 * b + c3 * (a * b) for c0, c1, c2, c3 in field])
+        return Shares(flow, {one: a, other: b}, unique)
 
 
-def _coefficients(mm: sympy.Expr, mp: sympy.Expr, pm: sympy.Expr, pp: sympy.Expr) -> tuple[sympy.Expr, ...]:
+def _coefficients(mm: Expression, mp: Expression, pm: Expression, pp: Expression) -> tuple[Expression, ...]:
     """Coefficients of 1, a, b and ab of the bilinear function with these values where a, b are -1 or 1."""
-    four = sympy.Integer(4)
     signs = (-1, -1, 1, 1), (-1, 1, -1, 1), (1, -1, -1, 1)
-    by_a, by_b, by_both = (combined(*zip(each, (mm, mp, pm, pp), strict=True)) / four for each in signs)
+    by_a, by_b, by_both = (combined(*zip(each, (mm, mp, pm, pp), strict=True)) / 4 for each in signs)
     return pp - by_a - by_b - by_both, by_a, by_b, by_both
 
 

@@ -10,17 +10,17 @@ from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
-import sympy
-
-from hybrid.symbolic.derivatives import jacobian_of
-from hybrid.symbolic.evaluation import expressed
-from hybrid.symbolic.expressions import ZERO, Less
-from hybrid.symbolic.tracing import trace
+from hybrid.expression.derivatives import jacobian_of
+from hybrid.expression.evaluation import expressed
+from hybrid.expression.nodes import ZERO, Expression, Number, add
+from hybrid.expression.operations import Less
+from hybrid.expression.polynomials import is_zero
+from hybrid.expression.tracing import trace
 from hybrid.system.elements import Function
 from hybrid.transform.cells import Cell, Pieces, Sides
 
 # A share of a side above this has come to its end if the speed of leaving the surface vanishes.
-NEARLY = sympy.Float(0.99)
+NEARLY = Number(0.99)
 
 # The sides of the surfaces that a state is on, by number: -1 below, 1 above, 0 sliding.
 Corner = dict[int, int]
@@ -48,7 +48,7 @@ def exits(sliding: Sequence[int], number: int, side: int) -> list[Corner]:
 
 def consistent(
     pieces: Pieces, sides: Sides, on: Sequence[int], leaving: int | None = None
-) -> list[sympy.Expr]:
+) -> list[Expression]:
     """Conditions that all hold where a cell is consistent, at a state on the surfaces ``on``.
 
     Parameters
@@ -68,7 +68,7 @@ def consistent(
     return [Less(ZERO, each) for each in positive]
 
 
-def reaches_end(pieces: Pieces, cell: Cell, way: Corner, leaving: int) -> list[sympy.Expr]:
+def reaches_end(pieces: Pieces, cell: Cell, way: Corner, leaving: int) -> list[Expression]:
     """Conditions that the share of the side to which an orbit leaves a surface has come to its end.
 
     The speed with which the orbit leaves also vanishes where the other solution for the shares comes to it.
@@ -102,8 +102,8 @@ def are_apart(pieces: Pieces, sides: Sides, on: Sequence[int]) -> bool:
         normals = jacobian_of(others, symbols.x) if others else []
         for changes in pieces.changes(sides, number):
             for normal in normals:
-                terms = (slope * change for slope, change in zip(normal, changes, strict=True) if slope != 0)
-                if sympy.Add(*terms).expand() != 0:
+                terms = (slope * change for slope, change in zip(normal, changes, strict=True))
+                if not is_zero(add(*terms)):
                     return False
     return True
 
@@ -115,10 +115,10 @@ def may_slide(pieces: Pieces, sides: Sides) -> bool:
         return False
     if len(on) < 2 or pieces.shares(sides) is not None:
         return True
-    return may_slide(pieces, {**sides, on[-1]: 2}) and attraction(pieces, sides).expand() != 0
+    return may_slide(pieces, {**sides, on[-1]: 2}) and not is_zero(attraction(pieces, sides))
 
 
-def slides(pieces: Pieces, sides: Sides) -> list[sympy.Expr]:
+def slides(pieces: Pieces, sides: Sides) -> list[Expression]:
     """Expressions that are all positive where an orbit slides along the surfaces on which a cell does."""
     on = [number for number, side in sides.items() if side == 0]
     if not on:
@@ -133,7 +133,7 @@ def slides(pieces: Pieces, sides: Sides) -> list[sympy.Expr]:
     return [attraction(pieces, sides), *(-below * above for below, above in rates)]
 
 
-def attraction(pieces: Pieces, sides: Sides) -> sympy.Expr:
+def attraction(pieces: Pieces, sides: Sides) -> Expression:
     """Positive where sliding along the surfaces on which a cell does may be stable.
 
     It is the determinant of the rates of the heights by the shares of the sides, up to a positive factor and
@@ -148,13 +148,13 @@ def attraction(pieces: Pieces, sides: Sides) -> sympy.Expr:
     return own * attraction(pieces, {**sides, last: 2}) if rest else own
 
 
-def speeds(pieces: Pieces, sides: Sides, number: int) -> tuple[sympy.Expr, sympy.Expr]:
+def speeds(pieces: Pieces, sides: Sides, number: int) -> tuple[Expression, Expression]:
     """The rates of a surface's height along the flows below it and above it."""
     below, above = (rate_of(pieces, number, pieces.flow({**sides, number: side})) for side in (-2, 2))
     return below, above
 
 
-def rate_of(pieces: Pieces, number: int, flow: Function) -> sympy.Expr:
+def rate_of(pieces: Pieces, number: int, flow: Function) -> Expression:
     """The rate of a surface's height along a flow."""
     surfaces, variables = pieces.surfaces, pieces.variables
     field = trace(flow, variables.state, variables.parameter_names)

@@ -8,8 +8,8 @@ from weakref import WeakKeyDictionary
 
 import attrs
 
-from hybrid.symbolic.reads import names_read
-from hybrid.symbolic.values import TraceError
+from hybrid.expression.reads import names_read
+from hybrid.expression.values import TraceError
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem

@@ -158,7 +158,7 @@ def _entered(source: str, target: str, switching: Function, when: Function | Non
 
 
 def _check_traceable(variables: Variables, below: Function, above: Function, switching: Function) -> None:
-    from hybrid.symbolic.tracing import TraceError, trace
+    from hybrid.expression.tracing import TraceError, trace
 
     n = variables.dimension
     for what, function, size in (("below", below, n), ("above", above, n), ("switching", switching, 1)):

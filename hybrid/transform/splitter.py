@@ -11,15 +11,14 @@ from typing import Any
 
 import attrs
 import numpy as np
-import sympy
-from sympy.core.parameters import distribute
 
 from hybrid.errors import ModelError
-from hybrid.symbolic.evaluation import Program, expressed, scalar
-from hybrid.symbolic.expressions import ZERO, And, Less, LessEqual, Not, Or
-from hybrid.symbolic.nodes import replaced, symbols_of
-from hybrid.symbolic.switches import Resolved, Surfaces, Switches
-from hybrid.symbolic.tracing import TraceError, model_symbols, trace
+from hybrid.expression.evaluation import Program, expressed, scalar
+from hybrid.expression.graph import replaced
+from hybrid.expression.nodes import ZERO, Expression, Symbol
+from hybrid.expression.operations import And, Less, LessEqual, Not, Or
+from hybrid.expression.switches import Resolved, Surfaces, Switches
+from hybrid.expression.tracing import TraceError, model_symbols, trace
 from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
@@ -51,8 +50,8 @@ class _Outgoing:
 
     index: int
     transition: Transition
-    guard: sympy.Expr | None
-    reset: list[sympy.Expr] | None
+    guard: Expression | None
+    reset: list[Expression] | None
 
 
 class Splitter:
@@ -120,11 +119,11 @@ class Splitter:
             self._make(missing, len(missing))
         return bool(missing)
 
-    def _values(self, t: float, x: np.ndarray, parameters: np.ndarray) -> dict[sympy.Symbol, float]:
+    def _values(self, t: float, x: np.ndarray, parameters: np.ndarray) -> dict[Symbol, float]:
         symbols = (self.symbols.t, *self.symbols.x, *self.symbols.p)
         return dict(zip(symbols, (t, *x, *parameters), strict=True))
 
-    def _cell_at(self, pieces: Pieces, values: dict[sympy.Symbol, float]) -> Cell:
+    def _cell_at(self, pieces: Pieces, values: dict[Symbol, float]) -> Cell:
         """The cell in which a point lies; above the surfaces that it lies on."""
         [choice] = pieces.cells({}, lambda number: self._side(number, values))
         return choice.cell
@@ -149,7 +148,7 @@ class Splitter:
                         f"its field at t = {t}, x = {x}: {part}, not {whole}. Please report this model."
                     )
 
-    def _side(self, number: int, values: dict[sympy.Symbol, float]) -> int:
+    def _side(self, number: int, values: dict[Symbol, float]) -> int:
         [height] = Program([self.surfaces.known[number].height]).run(values)
         return 1 if height >= 0 else -1
 
@@ -207,7 +206,7 @@ class Splitter:
         several = len(self.original.modes) > 1
         return f"{own}: {sides}" if sides and several else sides or own
 
-    def _traced(self, what: str, function: Function) -> list[sympy.Expr]:
+    def _traced(self, what: str, function: Function) -> list[Expression]:
         try:
             return trace(function, self.variables.state, self.variables.parameter_names)
         except TraceError as error:
@@ -224,14 +223,14 @@ class Splitter:
         ]
         return Pieces(index, field, watched, self.variables, self.surfaces)
 
-    def _guard(self, transition: Transition) -> sympy.Expr | None:
+    def _guard(self, transition: Transition) -> Expression | None:
         try:
             [guard] = trace(transition.guard.function, self.variables.state, self.variables.parameter_names)
         except TraceError:
             return None
         return guard
 
-    def _reset(self, transition: Transition) -> list[sympy.Expr] | None:
+    def _reset(self, transition: Transition) -> list[Expression] | None:
         if transition.reset is None:
             return [*self.symbols.x]
         try:
@@ -361,15 +360,15 @@ class Splitter:
         """A derived scalar function by its expression, which can be pickled."""
         return scalar(self._condition(function))
 
-    def _condition(self, function: Function) -> sympy.Expr:
+    def _condition(self, function: Function) -> Expression:
         [condition] = trace(function, self.variables.state, self.variables.parameter_names)
         return condition
 
     def _on(
-        self, chosen: Sequence[tuple[int, int]], after: Sequence[sympy.Expr] | None = None
-    ) -> list[sympy.Expr]:
+        self, chosen: Sequence[tuple[int, int]], after: Sequence[Expression] | None = None
+    ) -> list[Expression]:
         """Conditions that the state lies on these sides; with ``after``, the state after a reset."""
-        conditions: list[sympy.Expr] = []
+        conditions: list[Expression] = []
         for number, side in chosen:
             height = self.surfaces.known[number].height
             if after is not None:
@@ -377,9 +376,8 @@ class Splitter:
             conditions.append(LessEqual(ZERO, height) if side > 0 else Less(height, ZERO))
         return conditions
 
-    def _height_after(self, number: int, after: Sequence[sympy.Expr]) -> sympy.Expr:
-        with distribute(False):
-            return replaced(self.surfaces.known[number].height, dict(zip(self.symbols.x, after, strict=True)))
+    def _height_after(self, number: int, after: Sequence[Expression]) -> Expression:
+        return replaced(self.surfaces.known[number].height, dict(zip(self.symbols.x, after, strict=True)))
 
     def _copies(self, cell: Cell, outgoing: _Outgoing) -> Iterator[Edge]:
         """A user's transition in one cell: one for each side that the state may land on."""
@@ -413,7 +411,7 @@ class Splitter:
             )
             yield Edge(copy, landing.cell, limit)
 
-    def _truth(self, condition: Function) -> sympy.Expr:
+    def _truth(self, condition: Function) -> Expression:
         """A user's condition, positive or true, as a truth value."""
         [value] = self._traced("a condition of a guard", condition)
         return Less(ZERO, value)
@@ -431,7 +429,7 @@ class Splitter:
 
     def _after(
         self, cell: Cell, outgoing: _Outgoing
-    ) -> Iterator[tuple[tuple[tuple[int, int], ...], list[sympy.Expr] | None]]:
+    ) -> Iterator[tuple[tuple[tuple[int, int], ...], list[Expression] | None]]:
         """The states after a user's reset, for each choice of the branches that it has."""
         if outgoing.reset is None:
             yield (), None
@@ -446,7 +444,7 @@ class Splitter:
             else:
                 yield tuple(chosen.items()), outgoing.reset if not result.used else [*result.entries]
 
-    def _landings(self, cell: Cell, target: str, after: list[sympy.Expr] | None) -> list[Choice]:
+    def _landings(self, cell: Cell, target: str, after: list[Expression] | None) -> list[Choice]:
         """The cells of the target mode that the state after a reset may lie in."""
 
         def decide(number: int) -> int | None:
@@ -460,10 +458,10 @@ class Splitter:
             )
         return landings
 
-    def _side_after(self, cell: Cell, number: int, after: Sequence[sympy.Expr]) -> int | None:
+    def _side_after(self, cell: Cell, number: int, after: Sequence[Expression]) -> int | None:
         """The side of a surface on which a state lands from a cell, if it is always the same."""
         height = self._height_after(number, after)
-        if not symbols_of(height):
+        if not height.mask:
             # On the surface itself the rules of an instant decide; the state may be on either side.
             return -1 if float(height) < 0 else 1
         match = self.surfaces.match(height)
@@ -493,6 +491,6 @@ def _upper(sides: Sequence[tuple[int, int]]) -> dict[int, int]:
     return {number: side or 2 for number, side in sides}
 
 
-def _all(conditions: Sequence[sympy.Expr]) -> Function | None:
+def _all(conditions: Sequence[Expression]) -> Function | None:
     """The condition that all of several hold; None for none."""
     return scalar(reduce(And, conditions)) if conditions else None

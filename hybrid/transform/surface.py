@@ -57,10 +57,11 @@ class SwitchingSurface:
 
     def may_attract(self) -> bool:
         """Whether sliding is possible: False if the two speeds are proved equal everywhere."""
-        from hybrid.symbolic.tracing import trace
+        from hybrid.expression.polynomials import is_zero
+        from hybrid.expression.tracing import trace
 
         L_b, L_a = trace(self.speeds, self.variables.state, self.variables.parameter_names)
-        return bool((L_b - L_a).expand() != 0)
+        return not is_zero(L_b - L_a)
 
     def speeds(self, t: Any, x: Any, p: Any) -> tuple[Any, ...]:
         """``(L_b, L_a)``."""
@@ -69,8 +70,8 @@ class SwitchingSurface:
     @cached_property
     def sliding_field(self) -> Function:
         """The equivalent field, along which the switching function is constant."""
-        from hybrid.symbolic.evaluation import expressed
-        from hybrid.symbolic.tracing import trace
+        from hybrid.expression.evaluation import expressed
+        from hybrid.expression.tracing import trace
 
         def field(t: Any, x: Any, p: Any) -> list[Any]:
             L_b, L_a = self.speeds(t, x, p)
@@ -164,10 +165,9 @@ class SwitchingSurface:
 
 def _derived_gradient(variables: Variables, function: Function) -> Function:
     """``(D_x, D_t)`` of a scalar function as a model function, which can itself be traced."""
-    # SymPy is slow to import, so it is not imported with the library.
-    from hybrid.symbolic.derivatives import jacobian_of
-    from hybrid.symbolic.evaluation import expressed
-    from hybrid.symbolic.tracing import model_symbols, trace
+    from hybrid.expression.derivatives import jacobian_of
+    from hybrid.expression.evaluation import expressed
+    from hybrid.expression.tracing import model_symbols, trace
 
     names = variables.parameter_names
     symbols = model_symbols(variables.dimension, len(names))
@@ -177,8 +177,8 @@ def _derived_gradient(variables: Variables, function: Function) -> Function:
 
 def _rate(variables: Variables, gradient: Function, field: Function) -> Function:
     """``D_t g + D_x g f``, the rate of a function along a field, as a model function."""
-    from hybrid.symbolic.evaluation import scalar
-    from hybrid.symbolic.tracing import trace
+    from hybrid.expression.evaluation import scalar
+    from hybrid.expression.tracing import trace
 
     def rate(t: Any, x: Any, p: Any) -> Any:
         *normal, own = gradient(t, x, p)
@@ -201,15 +201,14 @@ def _cancelled(expression: Any) -> Any:
 
     A difference of two equal terms is zero but for rounding, and its series is rounding alone.
     """
-    from sympy import Add, expand_mul
-
-    from hybrid.symbolic.nodes import MOST_EXPANDED, is_larger_than, nodes_of
+    from hybrid.expression.graph import MOST_EXPANDED, is_larger_than, nodes_of, replaced
+    from hybrid.expression.nodes import Sum
+    from hybrid.expression.polynomials import expanded
 
     if is_larger_than(MOST_EXPANDED, expression):
         return expression
-    sums = {each: expand_mul(each) for each in nodes_of(Add, expression)}
-    simpler = {each: made for each, made in sums.items() if made.free_symbols < each.free_symbols}
-    return expression.xreplace(simpler)
+    sums = {each: expanded(each) for each in nodes_of(Sum, expression)}
+    return replaced(expression, {each: made for each, made in sums.items() if made.mask != each.mask})
 
 
 def _is_zero(value: Any) -> bool:

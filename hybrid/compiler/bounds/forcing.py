@@ -13,31 +13,54 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import attrs
-import sympy
-from sympy.codegen.cfunctions import exp2, expm1
 
 from hybrid.compiler.taylor.roots import is_multiple
-from hybrid.kernels.types.codes import ARGUMENTS, IN_TIME, TERMS
-from hybrid.symbolic.continuity import ROUNDING
-from hybrid.symbolic.expressions import (
+from hybrid.expression.continuity import ROUNDING
+from hybrid.expression.graph import degree_of, mentions, nodes, nodes_of, once
+from hybrid.expression.nodes import (
+    ZERO,
+    Expression,
+    Power,
+    Symbol,
+    add,
+    factors_of,
+    is_negative,
+    is_positive,
+    is_whole,
+    number,
+    terms_of,
+)
+from hybrid.expression.operations import (
     Absolute,
+    Arccos,
+    Arccosh,
+    Arcsin,
+    Arctan,
+    Cos,
+    Cosh,
     Equal,
+    Exp,
+    Exp2,
+    Expm1,
     Floor,
     Less,
     LessEqual,
+    Log,
     Maximum,
     Minimum,
     Remainder,
+    Several,
     Sign,
+    Sin,
+    Sinh,
     Step,
-    Together,
+    Tanh,
     Truncate,
     TruncatedRemainder,
-    number,
 )
-from hybrid.symbolic.nodes import degree_of, mentions, nodes, nodes_of, once
-from hybrid.symbolic.signs import simplified
-from hybrid.symbolic.tracing import Symbols
+from hybrid.expression.signs import simplified
+from hybrid.expression.tracing import Symbols
+from hybrid.kernels.types.codes import ARGUMENTS, IN_TIME, TERMS
 
 # Products of more factors that vary than these, such as ``(1 - t**2)**100``, are narrow pulses.
 MOST_FACTORS = 8
@@ -46,10 +69,8 @@ FACTORS_OF_HARMONIC = 2
 # Used instead of a component of the state if the forcing is not simply a term of the component's rate.
 NO_COMPONENT = -1
 # Functions that are flat to all digits if their argument is far from zero, on one side at least.
-EXPONENTIAL = (sympy.exp, sympy.tanh, sympy.erf, sympy.sinh, sympy.cosh, expm1, exp2)
-# Functions that switch once between two values.
-SWITCHES = (sympy.tanh, sympy.erf)
-# Beyond this argument they are constant to all digits.
+EXPONENTIAL = (Exp, Tanh, Sinh, Cosh, Expm1, Exp2)
+# Beyond this argument a hyperbolic tangent is constant to all digits.
 FLAT = 20.0
 # Functions that are constant but for jumps.
 JUMPS = (Sign, Step, Less, LessEqual, Equal, *ROUNDING)
@@ -58,11 +79,11 @@ APART = 16
 # Terms that fall like this power of the distance from a pulse, or more slowly, are seen from afar.
 MOST_FALL = 2.0
 # Functions that may be flat to all digits and change a little further on.
-SATURATING = (*EXPONENTIAL, sympy.atan)
+SATURATING = (*EXPONENTIAL, Arctan)
 # Functions with a branch point, beyond which their series goes on: that of ``arcsin(sin(q))`` is ``q``.
-BRANCHING = (sympy.asin, sympy.acos, sympy.acosh)
+BRANCHING = (Arcsin, Arccos, Arccosh)
 # A sum counts as a factor. A single exponential does not, since it makes no product narrower.
-SUMS_OF_EXPONENTIALS = (sympy.sinh, sympy.cosh, expm1)
+SUMS_OF_EXPONENTIALS = (Sinh, Cosh, Expm1)
 
 
 @attrs.frozen
@@ -73,7 +94,7 @@ class Forcing:
     series is compared with a field that saturates.
     """
 
-    expression: sympy.Basic | None
+    expression: Expression | None
     component: int
     kind: int = IN_TIME
 
@@ -92,12 +113,12 @@ class Times:
         The other components.
     """
 
-    passing: tuple[sympy.Symbol, ...]
-    all: tuple[sympy.Symbol, ...]
-    state: tuple[sympy.Symbol, ...]
+    passing: tuple[Symbol, ...]
+    all: tuple[Symbol, ...]
+    state: tuple[Symbol, ...]
 
 
-def times_of(field: Sequence[sympy.Expr], symbols: Symbols) -> Times:
+def times_of(field: Sequence[Expression], symbols: Symbols) -> Times:
     """The components of the state that tell the time in the mode of a field, and the others."""
     constant = [not mentions(rate, symbols.variables) for rate in field]
     clocks = tuple(x for x, same in zip(symbols.x, constant, strict=True) if same)
@@ -106,7 +127,7 @@ def times_of(field: Sequence[sympy.Expr], symbols: Symbols) -> Times:
 
 
 def forcings(
-    field: Sequence[sympy.Expr] | None, known: Sequence[sympy.Expr], symbols: Symbols
+    field: Sequence[Expression] | None, known: Sequence[Expression], symbols: Symbols
 ) -> tuple[Forcing, ...]:
     """The largest parts of a field in times and parameters alone, and terms that may be pulses in the state.
 
@@ -119,8 +140,8 @@ def forcings(
         return ()
     roots = frozenset(
         power
-        for power in nodes_of(sympy.Pow, *field)
-        if not power.exp.is_Integer
+        for power in nodes_of(Power, *field)
+        if not is_whole(power.exponent)
         and mentions(power.base, symbols.x)
         and any(is_multiple(simplified(power.base, known), guard, symbols) for guard in known)
     )
@@ -134,26 +155,26 @@ def forcings(
 
 
 def _in_state(
-    field: Sequence[sympy.Expr], known: Sequence[sympy.Expr], times: Times, symbols: Symbols
+    field: Sequence[Expression], known: Sequence[Expression], times: Times, symbols: Symbols
 ) -> Iterator[Forcing]:
     """The terms of a field that may be pulses in the state, behind the arguments that tell where."""
-    terms: list[list[sympy.Expr]] = []
-    arguments = dict[sympy.Expr, None]()
+    terms: list[list[Expression]] = []
+    arguments = dict[Expression, None]()
     for entry in field:
         terms.append([])
-        for term in sympy.Add.make_args(simplified(entry, known)):
+        for term in terms_of(simplified(entry, known)):
             if not mentions(term, times.state) or is_harmless(term, symbols.variables):
                 continue
             found = arguments_of(term, symbols.x)
             arguments.update(dict.fromkeys(found))
             terms[-1] += [term] if found else []
-    yield Forcing(sympy.Tuple(*arguments) if arguments else None, NO_COMPONENT, ARGUMENTS)
+    yield Forcing(Several(*arguments) if arguments else None, NO_COMPONENT, ARGUMENTS)
     for i, entry in enumerate(terms):
         if entry:
-            yield Forcing(sympy.Add(*entry), i, TERMS)
+            yield Forcing(add(*entry), i, TERMS)
 
 
-def arguments_of(expression: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> list[sympy.Expr]:
+def arguments_of(expression: Expression, variables: tuple[Symbol, ...]) -> list[Expression]:
     """What changes by more than 8 on each step on which a part of an expression may be flat and then change.
 
     These are the arguments of exponentials, the logarithms of powers, and the sides of kinks and jumps.
@@ -168,15 +189,15 @@ def arguments_of(expression: sympy.Expr, variables: tuple[sympy.Symbol, ...]) ->
     return [each for each in dict.fromkeys(found) if mentions(each, variables)]
 
 
-def _own_arguments(node: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> Iterator[sympy.Expr]:
+def _own_arguments(node: Expression, variables: tuple[Symbol, ...]) -> Iterator[Expression]:
     """The arguments of one node, if it is an exponential, a kink or a jump."""
-    if isinstance(node, SWITCHES):
+    if isinstance(node, Tanh):
         # Far from its switch it is a constant, however much its argument changes.
         yield Maximum(Minimum(node.args[0], number(FLAT)), number(-FLAT))
     elif isinstance(node, EXPONENTIAL):
         yield node.args[0]
-    elif node.is_Pow and mentions(node.exp, variables):
-        yield node.exp * sympy.log(node.base)
+    elif node.is_power and mentions(node.exponent, variables):
+        yield node.exponent * Log(node.base)
     elif isinstance(node, JUMPS):
         yield APART * node
     elif isinstance(node, Absolute):
@@ -189,51 +210,51 @@ def _own_arguments(node: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> Ite
         yield APART * Truncate(node.args[0] / node.args[1])
 
 
-def _logarithms(expression: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> Iterator[sympy.Expr]:
+def _logarithms(expression: Expression, variables: tuple[Symbol, ...]) -> Iterator[Expression]:
     """Logarithms of powers that are high, or that fall so fast that no solver sees their tails from afar.
 
     The tails of a term that falls like ``z**-2``, as gravity does, show wherever the pulse itself matters.
     """
     # Not by recursion: parts that are shared would be visited once for each way that leads to them.
-    seen, waiting = set[sympy.Expr](), [expression]
+    seen, waiting = set[Expression](), [expression]
     while waiting:
         node = waiting.pop()
         if node in seen or not mentions(node, variables):
             continue
         seen.add(node)
-        factors = sympy.Mul.make_args(node)
+        factors = factors_of(node)
         falls = sum(_growth(each, variables) for each in factors) < -MOST_FALL
         for factor in factors:
-            if not factor.is_Pow or mentions(factor.exp, variables):
+            if not factor.is_power or mentions(factor.exponent, variables):
                 waiting.extend(factor.args)
                 continue
-            high = not factor.exp.is_number or abs(factor.exp) > MOST_FACTORS
-            if mentions(factor.base, variables) and (high or (falls and factor.exp.is_negative)):
-                yield factor.exp * sympy.log(Absolute(factor.base))
+            high = not factor.exponent.is_number or abs(factor.exponent.value) > MOST_FACTORS
+            if mentions(factor.base, variables) and (high or (falls and is_negative(factor.exponent))):
+                yield factor.exponent * Log(Absolute(factor.base))
             waiting.append(factor.base)
 
 
 @once
-def _growth(node: sympy.Expr, variables: tuple[sympy.Symbol, ...]) -> float:
+def _growth(node: Expression, variables: tuple[Symbol, ...]) -> float:
     """The power of the distance with which an expression grows, or falls, near a place where it is large.
 
     A sine is the distance from its zero there.
     """
     if not mentions(node, variables):
         return 0.0
-    if node.is_Mul:
+    if node.is_product:
         return sum(_growth(each, variables) for each in node.args)
-    if node.is_Add:
+    if node.is_sum:
         return max(_growth(each, variables) for each in node.args)
-    if node.is_Pow and node.exp.is_number:
-        return float(node.exp) * _growth(node.base, variables)
-    if isinstance(node, Absolute | Together | Maximum | Minimum):
+    if node.is_power and node.exponent.is_number:
+        return float(node.exponent) * _growth(node.base, variables)
+    if isinstance(node, Absolute | Maximum | Minimum):
         return max(_growth(each, variables) for each in node.args)
     return 1.0
 
 
 @once
-def _saturates(node: sympy.Expr, variables: tuple[sympy.Symbol, ...], roots: frozenset[sympy.Expr]) -> bool:
+def _saturates(node: Expression, variables: tuple[Symbol, ...], roots: frozenset[Expression]) -> bool:
     """Whether an expression may change where its series is flat to all digits.
 
     ``tanh(v/1e-4)`` is, but for ``v`` close to 0, and so are ``x/sqrt(x**2 + 1e-16)``, ``(x/5)**40`` for
@@ -247,15 +268,15 @@ def _saturates(node: sympy.Expr, variables: tuple[sympy.Symbol, ...], roots: fro
     if isinstance(node, SATURATING):
         return True
     own = frozenset(variables)
-    if node.is_Mul or node.is_Pow:
+    if node.is_product or node.is_power:
         degree = degree_of(node, own)
         if degree is not None and degree > MOST_FACTORS:
             return True
-    if node.is_Pow and (
-        mentions(node.exp, variables) or (node.exp.is_Integer and abs(node.exp) > MOST_FACTORS)
+    if node.is_power and (
+        mentions(node.exponent, variables) or (is_whole(node.exponent) and abs(node.exponent.value) > MOST_FACTORS)
     ):
         return True
-    if isinstance(node, BRANCHING) or (node.is_Pow and not node.exp.is_Integer and node not in roots):
+    if isinstance(node, BRANCHING) or (node.is_power and not is_whole(node.exponent) and node not in roots):
         base = node.args[0]
         bases = base.args if isinstance(base, Maximum | Absolute) else (base,)
         degrees = [degree_of(base, own) for base in bases]
@@ -265,32 +286,32 @@ def _saturates(node: sympy.Expr, variables: tuple[sympy.Symbol, ...], roots: fro
 
 
 @once
-def _parts(node: sympy.Expr, component: int, times: Times) -> tuple[Forcing, ...]:
+def _parts(node: Expression, component: int, times: Times) -> tuple[Forcing, ...]:
     return tuple(dict.fromkeys(_found_parts(node, component, times)))
 
 
-def _found_parts(node: sympy.Expr, component: int, times: Times) -> Iterator[Forcing]:
+def _found_parts(node: Expression, component: int, times: Times) -> Iterator[Forcing]:
     if not mentions(node, times.passing):
         return
     own, others = [node], []
-    if node.is_Add or (node.is_Mul and mentions(node, times.state)):
+    if node.is_sum or (node.is_product and mentions(node, times.state)):
         own = [
             part for part in node.args if mentions(part, times.passing) and not mentions(part, times.state)
         ]
         others = [part for part in node.args if mentions(part, times.state)]
     elif mentions(node, times.state):
         own, others = [], [*node.args]
-    if node.is_Add:
+    if node.is_sum:
         own = [part for part in own if not is_harmless(part, times.all)]
-    whole = node.func(*own) if len(own) > 1 else own[0] if own else sympy.S.Zero
-    within = component if node.is_Add or not others else NO_COMPONENT
+    whole = node.rebuilt(own) if len(own) > 1 else own[0] if own else ZERO
+    within = component if node.is_sum or not others else NO_COMPONENT
     if not is_harmless(whole, times.all):
         yield Forcing(whole, within)
     for other in others:
         yield from _parts(other, within, times)
 
 
-def is_harmless(expression: sympy.Expr, times: tuple[sympy.Symbol, ...]) -> bool:
+def is_harmless(expression: Expression, times: tuple[Symbol, ...]) -> bool:
     """Whether an expression in times has no pulse so narrow that a solver could miss it.
 
     Sums of products of a few factors are harmless, where a factor is linear in the times, and a sine or
@@ -303,29 +324,29 @@ def is_harmless(expression: sympy.Expr, times: tuple[sympy.Symbol, ...]) -> bool
 
 
 @once
-def _factors(node: sympy.Expr, times: tuple[sympy.Symbol, ...]) -> int | None:
+def _factors(node: Expression, times: tuple[Symbol, ...]) -> int | None:
     """Number of factors of a product that vary, the most in any term of a sum; None for other functions."""
     if not mentions(node, times):
         return 0
     if node in times:
         return 1
-    if node.is_Add or isinstance(node, sympy.Mul | Together):
+    if node.is_sum or node.is_product:
         parts = [_factors(part, times) for part in node.args]
         numbers = [part for part in parts if part is not None]
         if len(numbers) < len(parts):
             return None
-        return sum(numbers) if not node.is_Add else max(1, *numbers)
-    if node.is_Pow and node.exp.is_Integer and node.exp.is_positive:
+        return sum(numbers) if not node.is_sum else max(1, *numbers)
+    if node.is_power and is_whole(node.exponent) and is_positive(node.exponent):
         factors = _factors(node.base, times)
-        return None if factors is None else factors * int(node.exp)
-    if node.is_Pow and mentions(node.base, times):
+        return None if factors is None else factors * node.exponent.value
+    if node.is_power and mentions(node.base, times):
         return None
     # The degree is that of a polynomial: a zero derivative would not prove that the argument has no jumps.
-    degree = degree_of(node.exp if node.is_Pow else node.args[0], frozenset(times))
+    degree = degree_of(node.exponent if node.is_power else node.args[0], frozenset(times))
     if degree is None:
         return None
-    if isinstance(node, sympy.sin | sympy.cos):
+    if isinstance(node, Sin | Cos):
         return FACTORS_OF_HARMONIC * degree
-    if isinstance(node, sympy.exp | exp2 | sympy.Pow) and degree == 1:
+    if isinstance(node, Exp | Exp2 | Power) and degree == 1:
         return 0
     return 1 if isinstance(node, SUMS_OF_EXPONENTIALS) and degree == 1 else None

@@ -11,56 +11,20 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import ClassVar
 
-import sympy
-from sympy.codegen.cfunctions import expm1, log1p, log2, log10
-
 from hybrid.compiler.bounds.forcing import is_harmless
 from hybrid.compiler.emitted import Programs
+from hybrid.expression.nodes import (
+    HALF,
+    Expression,
+    Number,
+    Product,
+    Sum,
+    is_negative,
+    is_whole,
+)
+from hybrid.expression.operations import Remainder, Several, TruncatedRemainder
+from hybrid.expression.tracing import Symbols
 from hybrid.kernels.arithmetic import operations as op
-from hybrid.symbolic import expressions as sym
-from hybrid.symbolic.tracing import Symbols
-
-ONE_OPERAND: dict[type[sympy.Basic], int] = {
-    sympy.exp: op.EXP,
-    sympy.log: op.LOG,
-    sym.CubeRoot: op.CUBE_ROOT,
-    sympy.sin: op.SIN,
-    sympy.cos: op.COS,
-    sympy.tan: op.TAN,
-    sympy.asin: op.ASIN,
-    sympy.acos: op.ACOS,
-    sympy.atan: op.ATAN,
-    sympy.sinh: op.SINH,
-    sympy.cosh: op.COSH,
-    sympy.tanh: op.TANH,
-    sympy.asinh: op.ASINH,
-    sympy.acosh: op.ACOSH,
-    sympy.atanh: op.ATANH,
-    log1p: op.LOG1P,
-    expm1: op.EXPM1,
-    sym.Absolute: op.ABSOLUTE,
-    sympy.Abs: op.ABSOLUTE,
-    sym.Floor: op.FLOOR,
-    sym.Level: op.FLOOR,
-    sym.Ceiling: op.CEILING,
-    sym.Truncate: op.TRUNCATE,
-    sym.Sign: op.SIGN,
-    sympy.sign: op.SIGN,
-    sym.Step: op.STEP,
-    sym.Not: op.NOT,
-}
-TWO_OPERANDS: dict[type[sympy.Basic], int] = {
-    sym.Maximum: op.MAXIMUM,
-    sym.Minimum: op.MINIMUM,
-    sym.LargerNumber: op.MAXIMUM,
-    sym.SmallerNumber: op.MINIMUM,
-    sym.Atan2: op.ANGLE,
-    sym.Less: op.LESS,
-    sym.LessEqual: op.LESS_EQUAL,
-    sym.Equal: op.EQUAL,
-    sym.And: op.AND,
-    sym.Or: op.OR,
-}
 
 
 class NoProgram(Exception):
@@ -68,9 +32,9 @@ class NoProgram(Exception):
 
 
 def programs(
-    guards: Sequence[sympy.Expr | None],
-    forcings: Sequence[sympy.Expr | None],
-    residues: Sequence[sympy.Expr | None],
+    guards: Sequence[Expression | None],
+    forcings: Sequence[Expression | None],
+    residues: Sequence[Expression | None],
     symbols: Symbols,
 ) -> Programs:
     """Programs of the guards' expressions, followed by those of the forcings and of the residues.
@@ -98,13 +62,13 @@ class _Writer:
     def __init__(self, symbols: Symbols, numbers: dict[float, int]) -> None:
         self.numbers = numbers
         self.rows: list[tuple[int, int, int, int]] = []
-        self.places: dict[sympy.Basic, int] = {}
+        self.places: dict[Expression, int] = {}
         self.times = (symbols.t, *symbols.x)
-        self.leaves: dict[sympy.Basic, tuple[int, int, int, int]] = {symbols.t: (op.TIME, 0, 0, 0)}
+        self.leaves: dict[Expression, tuple[int, int, int, int]] = {symbols.t: (op.TIME, 0, 0, 0)}
         self.leaves |= {x: (op.STATE, i, 0, 0) for i, x in enumerate(symbols.x)}
         self.leaves |= {p: (op.PARAMETER, i, 0, 0) for i, p in enumerate(symbols.p)}
 
-    def written(self, expression: sympy.Expr) -> list[tuple[int, int, int, int]]:
+    def written(self, expression: Expression) -> list[tuple[int, int, int, int]]:
         """All rows; the last one computes the expression."""
         last = self.place(expression)
         if last != len(self.rows) - 1:
@@ -118,7 +82,7 @@ class _Writer:
         If several expressions were written, the 1 stands for these.
         """
         marks = [0] * (len(self.rows) - 1) + [1]
-        several = [each for each in self.places if isinstance(each, sympy.Tuple)]
+        several = [each for each in self.places if isinstance(each, Several)]
         if several:
             return [int(row in {self.places[each] for each in several[0]}) for row in range(len(self.rows))]
         for expression, row in self.places.items():
@@ -126,7 +90,7 @@ class _Writer:
                 marks[row] = 1
         return marks
 
-    def place(self, expression: sympy.Expr) -> int:
+    def place(self, expression: Expression) -> int:
         """Row of a subexpression."""
         if expression not in self.places:
             self.places[expression] = self._written(expression)
@@ -137,7 +101,7 @@ class _Writer:
         return len(self.rows) - 1
 
     def _number(self, value: float) -> int:
-        key = sympy.Float(value)
+        key = Number(float(value))
         if key not in self.places:
             self.places[key] = self._add(op.NUMBER, self._index(value))
         return self.places[key]
@@ -145,31 +109,29 @@ class _Writer:
     def _index(self, value: float) -> int:
         return self.numbers.setdefault(float(value), len(self.numbers))
 
-    def _written(self, expression: sympy.Expr) -> int:
+    def _written(self, expression: Expression) -> int:
         if expression in self.leaves:
             return self._add(*self.leaves[expression])
-        if expression.is_Number or expression.is_NumberSymbol:
+        if expression.is_number:
             return self._number(float(expression))
-        if expression.is_Pow:
+        if expression.is_power:
             return self._power(*expression.args)
-        function, arguments = expression.func, expression.args
-        if function in ONE_OPERAND:
-            return self._add(ONE_OPERAND[function], self.place(arguments[0]))
-        if function in TWO_OPERANDS:
-            return self._add(TWO_OPERANDS[function], *map(self.place, arguments))
-        if function in sym.IN_OTHER_TERMS:
-            return self.place(sym.IN_OTHER_TERMS[function](*arguments))
-        if function not in self.RULES:
-            raise NoProgram(f"{function.__name__} has no interval arithmetic here")
-        return self.RULES[function](self, *arguments)
+        kind, arguments = type(expression), expression.args
+        if kind in self.RULES:
+            return self.RULES[kind](self, *arguments)
+        if expression.bounds:
+            return self._add(expression.bounds, *map(self.place, arguments))
+        if expression.in_other_terms is not None:
+            return self.place(expression.in_other_terms(*arguments))
+        raise NoProgram(f"{kind.__name__} has no interval arithmetic here")
 
-    def _sum(self, *terms: sympy.Expr) -> int:
+    def _sum(self, *terms: Expression) -> int:
         total = self.place(terms[0])
         for term in terms[1:]:
             total = self._add(op.SUM, total, self.place(term))
         return total
 
-    def _product(self, *factors: sympy.Expr) -> int:
+    def _product(self, *factors: Expression) -> int:
         above = [f for f in factors if not self._divides(f)]
         below = [1 / f for f in factors if self._divides(f)]
         total = self.place(above[0]) if above else self._number(1.0)
@@ -180,16 +142,16 @@ class _Writer:
         return total
 
     @staticmethod
-    def _divides(factor: sympy.Expr) -> bool:
-        return bool(factor.is_Pow and factor.exp.is_Number and factor.exp.is_negative)
+    def _divides(factor: Expression) -> bool:
+        return factor.is_power and is_negative(factor.exponent)
 
-    def _power(self, base: sympy.Expr, exponent: sympy.Expr) -> int:
+    def _power(self, base: Expression, exponent: Expression) -> int:
         a = self.place(base)
-        if exponent.is_Integer:
-            return self._add(op.WHOLE_POWER, a, int(exponent))
-        if exponent == sym.HALF:
+        if is_whole(exponent):
+            return self._add(op.WHOLE_POWER, a, int(exponent.value))
+        if exponent is HALF:
             return self._add(op.SQRT, a)
-        if exponent.is_Number:
+        if exponent.is_number:
             return self._whole_or_fixed(a, float(exponent))
         logarithm = self._add(op.LOG, a)
         return self._add(op.EXP, self._add(op.PRODUCT, logarithm, self.place(exponent)))
@@ -199,22 +161,16 @@ class _Writer:
             return self._add(op.WHOLE_POWER, base, int(exponent))
         return self._add(op.FIXED_POWER, base, self._index(exponent))
 
-    def _select(self, condition: sympy.Expr, a: sympy.Expr, b: sympy.Expr) -> int:
-        return self._add(op.SELECT, self.place(condition), self.place(a), self.place(b))
-
-    def _remainder(self, rounding: int, a: sympy.Expr, b: sympy.Expr) -> int:
+    def _remainder(self, rounding: int, a: Expression, b: Expression) -> int:
         """``a - b*round(a/b)``; ``rounding`` rounds down or towards zero."""
         whole = self._add(rounding, self._add(op.QUOTIENT, self.place(a), self.place(b)))
         less = self._add(op.PRODUCT, self._number(-1.0), self._add(op.PRODUCT, self.place(b), whole))
         return self._add(op.SUM, self.place(a), less)
 
-    RULES: ClassVar[dict[type[sympy.Basic], Callable[..., int]]] = {
-        sympy.Add: _sum,
-        sympy.Tuple: lambda self, *several: [self.place(each) for each in several][-1],
-        sympy.Mul: _product,
-        sym.Select: _select,
-        log2: lambda self, u: self.place(sympy.log(u) / sympy.log(2)),
-        log10: lambda self, u: self.place(sympy.log(u) / sympy.log(10)),
-        sym.Remainder: lambda self, a, b: self._remainder(op.FLOOR, a, b),
-        sym.TruncatedRemainder: lambda self, a, b: self._remainder(op.TRUNCATE, a, b),
+    RULES: ClassVar[dict[type[Expression], Callable[..., int]]] = {
+        Sum: _sum,
+        Several: lambda self, *several: [self.place(each) for each in several][-1],
+        Product: _product,
+        Remainder: lambda self, a, b: self._remainder(op.FLOOR, a, b),
+        TruncatedRemainder: lambda self, a, b: self._remainder(op.TRUNCATE, a, b),
     }

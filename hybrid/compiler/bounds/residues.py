@@ -10,23 +10,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import attrs
-import sympy
 
-from hybrid.symbolic.nodes import mentions, nodes
-from hybrid.symbolic.tracing import Symbols
+from hybrid.expression.graph import mentions, nodes
+from hybrid.expression.nodes import Expression, Function, add
+from hybrid.expression.tracing import Symbols
 
 
 @attrs.frozen
 class Residue:
     """A rate, and the component of the state that has this rate."""
 
-    expression: sympy.Expr
+    expression: Expression
     component: int
 
 
 def residues(
-    field: Sequence[sympy.Expr] | None,
-    gradients: Iterable[Sequence[sympy.Expr] | None],
+    field: Sequence[Expression] | None,
+    gradients: Iterable[Sequence[Expression] | None],
     symbols: Symbols,
 ) -> tuple[Residue, ...]:
     """The rates with terms that may cancel and on which the speed of a guard of the mode depends.
@@ -44,19 +44,19 @@ def residues(
     )
 
 
-def residue_of_guard(guard: sympy.Expr | None, symbols: Symbols) -> sympy.Expr | None:
+def residue_of_guard(guard: Expression | None, symbols: Symbols) -> Expression | None:
     """The terms of a guard in time and parameters alone, if they may cancel and the guard has other terms."""
-    if guard is None or not guard.is_Add or not _may_cancel(guard, symbols):
+    if guard is None or not guard.is_sum or not _may_cancel(guard, symbols):
         return None
     free = [term for term in guard.args if not mentions(term, symbols.x)]
-    return sympy.Add(*free) if 0 < len(free) < len(guard.args) else None
+    return add(*free) if 0 < len(free) < len(guard.args) else None
 
 
-def _may_cancel(rate: sympy.Expr, symbols: Symbols) -> bool:
+def _may_cancel(rate: Expression, symbols: Symbols) -> bool:
     """Whether a rate has a sum with two terms without the state, or a function without the state."""
     for node in nodes(rate):
-        if node.is_Add and sum(not mentions(term, symbols.x) for term in node.args) > 1:
+        if node.is_sum and sum(not mentions(term, symbols.x) for term in node.args) > 1:
             return True
-        if node.is_Function and not mentions(node, symbols.x):
+        if isinstance(node, Function) and not mentions(node, symbols.x):
             return True
     return False

@@ -32,8 +32,8 @@ from hybrid.compiler.cache.folder import (
 from hybrid.compiler.cache.kernel import file_of, kernels_in
 from hybrid.compiler.interrupts import between_passes
 from hybrid.compiler.llvm.engine import cpu, processor
+from hybrid.expression.branches import PARSER
 from hybrid.kernels.types.kinds import text_of
-from hybrid.symbolic.branches import PARSER
 
 DRIVER = "hybrid.kernels.drive"
 LIMITS = "hybrid.kernels.limit.go"

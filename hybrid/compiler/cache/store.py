@@ -1,4 +1,4 @@
-"""Results of tracing systems, stored on disk, so that the next process need not wait for SymPy."""
+"""Results of tracing systems, stored on disk, so that the next process need not wait for them."""
 
 from __future__ import annotations
 
@@ -54,15 +54,12 @@ def _digest(operations: str) -> str:
 
 @cache
 def _tracer() -> str:
-    """Sources of this package and versions of its dependencies, on which the results of tracing depend."""
-    import importlib.metadata
-
+    """Sources of this package and versions on which the results of tracing depend."""
     kernels = PACKAGE / "kernels"
     # The name of the folder already depends on the kernels.
     sources = [path for path in sources_in(PACKAGE) if kernels not in path.parents]
     digest = hashlib.sha256(b"\0".join(path.read_bytes() for path in sources)).hexdigest()
-    versions = [importlib.metadata.version(package) for package in ("sympy", "mpmath")]
-    return " ".join([digest, sys.version, np.__version__, *versions])
+    return " ".join([digest, sys.version, np.__version__])
 
 
 def _read(content: bytes | None) -> Emitted | None:

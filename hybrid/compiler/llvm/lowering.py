@@ -16,11 +16,11 @@ import attrs
 from llvmlite import ir
 
 from hybrid.compiler.llvm.calls import CALLS, NUMBER, WHOLE, Call
+from hybrid.expression.branches import PARSER
 from hybrid.kernels.instructions.loops import loop
 from hybrid.kernels.instructions.registers import Matrix, everywhere, vector_of
 from hybrid.kernels.types.codes import NARROW
 from hybrid.kernels.types.numba_door.builder import Builder
-from hybrid.symbolic.branches import PARSER
 
 TRUTH = ir.IntType(1)
 ADDRESS = ir.PointerType()

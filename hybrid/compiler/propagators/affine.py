@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import sympy
-
 from hybrid.compiler.emitted import Propagator, Series
 from hybrid.compiler.propagators.equations import Equations
 from hybrid.compiler.propagators.writing import OTHERS, groups, harmonics_of, names_of_state, write_series
 from hybrid.compiler.taylor.linear import LinearForm, linear_form, table_statements
 from hybrid.compiler.taylor.loops import padded
+from hybrid.expression.code import assignments
+from hybrid.expression.constants import Constants
+from hybrid.expression.nodes import Expression, Symbol
+from hybrid.expression.tracing import Symbols
 from hybrid.kernels.types.codes import EXACT, WIDE
-from hybrid.symbolic.constants import Constants
-from hybrid.symbolic.printer import assignments
-from hybrid.symbolic.tracing import Symbols
 
 
 def affine(mode: Equations) -> Propagator | str:
@@ -29,7 +28,7 @@ def affine(mode: Equations) -> Propagator | str:
 
 
 def _write_linear(
-    form: LinearForm, harmonics: dict[sympy.Expr, sympy.Symbol], guards: int, symbols: Symbols
+    form: LinearForm, harmonics: dict[Expression, Symbol], guards: int, symbols: Symbols
 ) -> Series:
     n, constants = len(symbols.x), Constants()
     begun = [f"start{i}" for i in range(len(harmonics))]

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import sympy
-from sympy.core.parameters import distribute
-
 from hybrid.compiler.emitted import Propagator
 from hybrid.compiler.propagators.affine import affine
 from hybrid.compiler.propagators.desingularised import desingularised
@@ -15,8 +12,9 @@ from hybrid.compiler.propagators.polynomial import polynomial
 from hybrid.compiler.propagators.rooted import rooted
 from hybrid.compiler.propagators.taylor import taylor
 from hybrid.compiler.taylor.series import NoSeries
+from hybrid.expression.nodes import Expression
+from hybrid.expression.tracing import Symbols
 from hybrid.kernels.types.codes import RUNGE_KUTTA
-from hybrid.symbolic.tracing import Symbols
 
 # Each strategy returns a propagator, or the reason why it does not apply. NoSeries means that none applies.
 Strategy = Callable[[Equations], Propagator | str]
@@ -24,20 +22,19 @@ STRATEGIES: list[Strategy] = [rooted, desingularised, polynomial, affine, taylor
 
 
 def propagator(
-    field: Sequence[sympy.Expr] | None, boundaries: Sequence[Boundary], symbols: Symbols
+    field: Sequence[Expression] | None, boundaries: Sequence[Boundary], symbols: Symbols
 ) -> Propagator:
     """The propagator of a mode from its traced field (None if it could not be traced) and its guards."""
     if field is None:
         return Propagator(RUNGE_KUTTA, 0, "its field is not traced")
     reason = ""
     try:
-        with distribute(False):
-            mode = equations_of(field, boundaries, symbols)
-            for strategy in STRATEGIES:
-                found = strategy(mode)
-                if isinstance(found, Propagator):
-                    return found
-                reason = found
+        mode = equations_of(field, boundaries, symbols)
+        for strategy in STRATEGIES:
+            found = strategy(mode)
+            if isinstance(found, Propagator):
+                return found
+            reason = found
     except NoSeries as refusal:
         reason = str(refusal)
     except RecursionError:

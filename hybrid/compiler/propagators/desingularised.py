@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import sympy
-
 from hybrid.compiler.emitted import Propagator, Series
 from hybrid.compiler.propagators.equations import Boundary, Equations, in_terms_of_root
 from hybrid.compiler.propagators.writing import CLOCK, Body, harmonics_of, names_of_state, seeds_of
 from hybrid.compiler.taylor.roots import ROOT, in_roots, is_crossed, on_clock, slope_along
 from hybrid.compiler.taylor.series import NoSeries
+from hybrid.expression.code import assignments
+from hybrid.expression.derivatives import derivative, directional, divergence
+from hybrid.expression.graph import all_replaced, replaced
+from hybrid.expression.nodes import Expression
+from hybrid.expression.tracing import Symbols
 from hybrid.kernels.types.codes import DESINGULARISED
-from hybrid.symbolic.derivatives import directional, divergence
-from hybrid.symbolic.nodes import replaced
-from hybrid.symbolic.printer import assignments
-from hybrid.symbolic.tracing import Symbols
 
 
 def desingularised(mode: Equations) -> Propagator | str:
@@ -35,10 +34,10 @@ def desingularised(mode: Equations) -> Propagator | str:
 
 
 def _write_desingularised(
-    field: Sequence[sympy.Expr],
+    field: Sequence[Expression],
     boundaries: Sequence[Boundary],
-    guards: Sequence[sympy.Expr],
-    z: sympy.Expr,
+    guards: Sequence[Expression],
+    z: Expression,
     order: int,
     symbols: Symbols,
 ) -> Series:
@@ -52,7 +51,7 @@ def _write_desingularised(
     with, ``z`` is its square, and only a root that has drifted from the states is taken from them again.
     """
     harmonics = harmonics_of(field, symbols)
-    field = [replaced(rate, harmonics) for rate in field]
+    field = all_replaced(field, harmonics)
     # The time since the start is advanced too, in the column after the states.
     body = Body(symbols, guards, [ROOT, *harmonics.values()], f"{{}}y{len(symbols.x)}")
     clock, (root, *driven) = body.column(CLOCK), body.rows.values()
@@ -70,7 +69,7 @@ def _write_desingularised(
     tangents = [on_clock(along, z, order) for along in directional(field, seeds)]
     trace = on_clock(divergence(field, symbols.x), z, order)
     pace = ROOT ** (order - 1)
-    turning = [pace * replaced(function.diff(symbols.t), harmonics) for function in harmonics]
+    turning = [pace * replaced(derivative(function, symbols.t), harmonics) for function in harmonics]
     begun = [f"start{i}" for i in range(len(harmonics))]
     body.preamble += assignments(begun, list(harmonics))
     return body.assemble(

@@ -10,33 +10,33 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 
 import attrs
-import sympy
 
 from hybrid.compiler.taylor.roots import is_multiple, singular_bases, with_fractions
-from hybrid.symbolic.derivatives import partial_derivatives
-from hybrid.symbolic.expressions import ZERO, Together
-from hybrid.symbolic.nodes import mentions, nodes
-from hybrid.symbolic.signs import sign_of, simplified
-from hybrid.symbolic.tracing import Symbols
+from hybrid.expression.derivatives import derivative, partial_derivatives
+from hybrid.expression.graph import mentions, nodes
+from hybrid.expression.nodes import ZERO, Expression, Symbol, is_positive, is_whole
+from hybrid.expression.operations import Cos, Cosh, Exp, Sin, Sinh
+from hybrid.expression.signs import sign_of, simplified
+from hybrid.expression.tracing import Symbols
 
-ELEMENTARY = (sympy.sin, sympy.cos, sympy.exp, sympy.sinh, sympy.cosh)
+ELEMENTARY = (Sin, Cos, Exp, Sinh, Cosh)
 
 
 @attrs.frozen
 class Boundary:
     """A guard of a mode: its expression, and its sign inside the mode if the mode ends there, else 0."""
 
-    guard: sympy.Expr | None
+    guard: Expression | None
     inside: int
     is_affine: bool = False
 
 
-def known_positive(boundaries: Iterable[Boundary]) -> list[sympy.Expr]:
+def known_positive(boundaries: Iterable[Boundary]) -> list[Expression]:
     """Expressions that are positive or zero in the whole mode, because the mode ends at its guards."""
     return [b.guard if b.inside > 0 else -b.guard for b in boundaries if b.inside and b.guard is not None]
 
 
-def columns_of_guards(boundaries: Sequence[Boundary], held: Sequence[bool]) -> list[sympy.Expr]:
+def columns_of_guards(boundaries: Sequence[Boundary], held: Sequence[bool]) -> list[Expression]:
     """The expressions in the columns of the guards; zero for a guard that its interval program bounds."""
     pairs = zip(boundaries, held, strict=True)
     return [b.guard if is_held and b.guard is not None else ZERO for b, is_held in pairs]
@@ -60,19 +60,19 @@ class Equations:
         For each guard, whether the series of the mode hold it.
     """
 
-    field: Sequence[sympy.Expr]
+    field: Sequence[Expression]
     boundaries: Sequence[Boundary]
     symbols: Symbols
-    bases: Mapping[sympy.Expr, int]
+    bases: Mapping[Expression, int]
     held: Sequence[bool]
 
     @cached_property
-    def guards(self) -> list[sympy.Expr]:
+    def guards(self) -> list[Expression]:
         """The expressions in the columns of the guards."""
         return columns_of_guards(self.boundaries, self.held)
 
     @cached_property
-    def jacobian(self) -> list[list[sympy.Expr]]:
+    def jacobian(self) -> list[list[Expression]]:
         """``D_x f``."""
         return partial_derivatives(self.field, self.symbols.x)
 
@@ -87,7 +87,7 @@ class Equations:
         return all(_elementary(entry, self.symbols) for entry in self.field)
 
 
-def equations_of(field: Sequence[sympy.Expr], boundaries: Sequence[Boundary], symbols: Symbols) -> Equations:
+def equations_of(field: Sequence[Expression], boundaries: Sequence[Boundary], symbols: Symbols) -> Equations:
     """The equations of a mode from its traced field and its guards.
 
     Raises
@@ -102,7 +102,7 @@ def equations_of(field: Sequence[sympy.Expr], boundaries: Sequence[Boundary], sy
     return Equations(field, boundaries, symbols, bases, held)
 
 
-def _is_held(boundary: Boundary, bases: Iterable[sympy.Expr], symbols: Symbols) -> bool:
+def _is_held(boundary: Boundary, bases: Iterable[Expression], symbols: Symbols) -> bool:
     """Whether the series of a mode hold the guard: it is affine, or the series may hold its root."""
     guard = boundary.guard
     if guard is None:
@@ -111,8 +111,8 @@ def _is_held(boundary: Boundary, bases: Iterable[sympy.Expr], symbols: Symbols) 
 
 
 def in_terms_of_root(
-    boundaries: Sequence[Boundary], z: sympy.Expr, root: sympy.Symbol, symbols: Symbols
-) -> dict[int, sympy.Expr]:
+    boundaries: Sequence[Boundary], z: Expression, root: Symbol, symbols: Symbols
+) -> dict[int, Expression]:
     """Guards that are multiples of ``z``, by place: the root with the sign of the guard inside the mode."""
     return {
         place: (boundary.inside or sign_of(boundary.guard, [z]) or 1) * root
@@ -121,16 +121,14 @@ def in_terms_of_root(
     }
 
 
-def _elementary(entry: sympy.Expr, symbols: Symbols) -> bool:
+def _elementary(entry: Expression, symbols: Symbols) -> bool:
     """Whether time enters only through polynomials and through harmonics and exponentials of linear terms."""
     for node in nodes(entry):
-        if not mentions(node, (symbols.t,)) or node.is_Symbol or node.is_Add or node.is_Mul:
+        if not mentions(node, (symbols.t,)) or node.is_symbol or node.is_sum or node.is_product:
             continue
-        if isinstance(node, Together):  # a product, too
+        if node.is_power and is_whole(node.exponent) and is_positive(node.exponent):
             continue
-        if node.is_Pow and node.exp.is_Integer and node.exp.is_positive:
-            continue
-        if isinstance(node, ELEMENTARY) and not mentions(node.args[0].diff(symbols.t), (symbols.t,)):
+        if isinstance(node, ELEMENTARY) and not mentions(derivative(node.args[0], symbols.t), (symbols.t,)):
             continue
         return False
     return True

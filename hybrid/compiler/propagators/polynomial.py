@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import sympy
-
 from hybrid.compiler.emitted import Propagator
 from hybrid.compiler.propagators.equations import Equations, columns_of_guards
 from hybrid.compiler.propagators.writing import write_series
+from hybrid.expression.graph import degree_of
+from hybrid.expression.nodes import Expression
+from hybrid.expression.tracing import Symbols
 from hybrid.kernels.types.codes import EXACT, HIGHEST_ORDER
-from hybrid.symbolic.nodes import degree_of
-from hybrid.symbolic.tracing import Symbols
 
 
 def polynomial(mode: Equations) -> Propagator | str:
@@ -29,13 +28,13 @@ def polynomial(mode: Equations) -> Propagator | str:
     return Propagator(EXACT, degree, f"polynomials of degree {degree}", written, tuple(held))
 
 
-def _polynomial(guard: sympy.Expr, symbols: Symbols) -> int:
+def _polynomial(guard: Expression, symbols: Symbols) -> int:
     """Degree of a guard that is a polynomial in state and time, at least 1; zero for any other."""
     degree = degree_of(guard, frozenset(symbols.variables))
     return 0 if degree is None else max(1, degree)
 
 
-def _degree(field: Sequence[sympy.Expr], jacobian: Sequence[Sequence[sympy.Expr]], symbols: Symbols) -> int:
+def _degree(field: Sequence[Expression], jacobian: Sequence[Sequence[Expression]], symbols: Symbols) -> int:
     """Degree of the solutions in time if no component acts back on itself, else 0.
 
     Then each rate is the integral of forcing and of components that come before it. A matrix whose entries

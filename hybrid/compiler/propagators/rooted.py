@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import sympy
-
 from hybrid.compiler.emitted import Propagator, Series
 from hybrid.compiler.propagators.equations import Boundary, Equations, in_terms_of_root
 from hybrid.compiler.propagators.writing import Body, names_of_state, seeds_of
 from hybrid.compiler.taylor.roots import Root, in_roots, regular_root
 from hybrid.compiler.taylor.series import ONE_THEN_ZERO
+from hybrid.expression.derivatives import directional, divergence
+from hybrid.expression.nodes import Expression
+from hybrid.expression.tracing import Symbols
 from hybrid.kernels.types.codes import ROOTED
-from hybrid.symbolic.derivatives import directional, divergence
-from hybrid.symbolic.tracing import Symbols
 
 
 def rooted(mode: Equations) -> Propagator | str:
@@ -35,9 +34,9 @@ def rooted(mode: Equations) -> Propagator | str:
 
 
 def _write_rooted(
-    field: Sequence[sympy.Expr],
+    field: Sequence[Expression],
     boundaries: Sequence[Boundary],
-    guards: Sequence[sympy.Expr],
+    guards: Sequence[Expression],
     roots: Sequence[Root],
     symbols: Symbols,
 ) -> Series:
@@ -45,13 +44,13 @@ def _write_rooted(
     body = Body(symbols, guards, [root.symbol for root in roots], ONE_THEN_ZERO)
     seeds = seeds_of(symbols)
 
-    def in_all_roots(expression: sympy.Expr) -> sympy.Expr:
+    def in_all_roots(expression: Expression) -> Expression:
         for root in roots:
             expression = in_roots(expression, root.base, root.order, root.symbol)
         return expression
 
-    signed: dict[int, sympy.Expr] = {}
-    names = [f"root_{root.symbol}" for root in roots]
+    signed: dict[int, Expression] = {}
+    names = [f"root_{root.symbol.label}" for root in roots]
     for name, root in zip(names, roots, strict=True):
         places = in_terms_of_root(boundaries, root.base, root.symbol, symbols)
         body.start_root(name, root.base, root.order, min(places), goes_on=False)

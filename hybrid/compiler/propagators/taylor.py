@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from sympy.codegen.cfunctions import hypot
-
 from hybrid.compiler.emitted import Propagator
 from hybrid.compiler.propagators.equations import Equations
 from hybrid.compiler.propagators.writing import write_series
+from hybrid.expression.graph import nodes
+from hybrid.expression.nodes import is_whole
+from hybrid.expression.operations import Hypot
 from hybrid.kernels.types.codes import TAYLOR
-from hybrid.symbolic.nodes import nodes
 
 
 def taylor(mode: Equations) -> Propagator | str:
@@ -23,7 +23,7 @@ def taylor(mode: Equations) -> Propagator | str:
 def _has_roots(mode: Equations) -> bool:
     """Whether the field has fractional powers or lengths of the state: they have no series at zero."""
     return any(
-        (node.is_Pow and not node.exp.is_Integer) or isinstance(node, hypot)
+        (node.is_power and not is_whole(node.exponent)) or isinstance(node, Hypot)
         for entry in mode.field
         for node in nodes(entry)
     )

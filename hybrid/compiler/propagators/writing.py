@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-import sympy
-
 from hybrid.compiler.emitted import Series
 from hybrid.compiler.propagators.equations import ELEMENTARY
 from hybrid.compiler.taylor.loops import StateLoop, TangentLoop, indented, padded
 from hybrid.compiler.taylor.pairs import columns_of
 from hybrid.compiler.taylor.series import ONE_THEN_ZERO, PAIRS, Recurrences
+from hybrid.expression.code import assignments
+from hybrid.expression.constants import Constants
+from hybrid.expression.derivatives import derivative, directional, divergence
+from hybrid.expression.graph import mentions, nodes_of
+from hybrid.expression.nodes import ZERO, Expression, Symbol, add, order_of
+from hybrid.expression.operations import Absolute
+from hybrid.expression.tracing import Symbols
 from hybrid.kernels.types.codes import FROM_LAST_STEP, FROM_ZERO, NARROW, WIDE
-from hybrid.symbolic.constants import Constants
-from hybrid.symbolic.derivatives import directional, divergence
-from hybrid.symbolic.nodes import mentions, nodes_of
-from hybrid.symbolic.printer import assignments
-from hybrid.symbolic.tracing import Symbols
 
 # Columns after those of the guards: the time since the start of the step, the integral of div f. All columns
 # up to here are written and evaluated as whole vectors. The root of a desingularised mode comes next.
@@ -27,7 +27,7 @@ FLOOR = 1e-17
 SAME_ROOT = 1e-13
 
 
-def write_series(field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], symbols: Symbols) -> Series:
+def write_series(field: Sequence[Expression], guards: Sequence[Expression], symbols: Symbols) -> Series:
     """The series of a field in time, without and with tangent vectors."""
     body = Body(symbols, guards, (), ONE_THEN_ZERO)
     seeds = seeds_of(symbols)
@@ -36,24 +36,24 @@ def write_series(field: Sequence[sympy.Expr], guards: Sequence[sympy.Expr], symb
     return body.assemble(symbols.x, *names_of_state(symbols), field, guards, trace, tangents, seeds)
 
 
-def harmonics_of(field: Sequence[sympy.Expr], symbols: Symbols) -> dict[sympy.Expr, sympy.Symbol]:
+def harmonics_of(field: Sequence[Expression], symbols: Symbols) -> dict[Expression, Symbol]:
     """Symbols for the sines, cosines and exponentials of linear functions of time, closed under ``d/dt``.
 
     On a clock of their own they are states like others: their rates share the factor of all rates.
     """
-    found: dict[sympy.Expr, sympy.Symbol] = {}
-    for node in sorted(nodes_of(ELEMENTARY, *field), key=sympy.default_sort_key):
-        slope = node.args[0].diff(symbols.t)
-        if slope == 0 or mentions(slope, (symbols.t,)) or mentions(node, symbols.x):
+    found: dict[Expression, Symbol] = {}
+    for node in sorted(nodes_of(ELEMENTARY, *field), key=order_of):
+        slope = derivative(node.args[0], symbols.t)
+        if slope is ZERO or mentions(slope, (symbols.t,)) or mentions(node, symbols.x):
             continue
-        for function in PAIRS.get(node.func, (node.func,))[:2]:
-            found.setdefault(function(node.args[0]), sympy.Symbol(f"h{len(found)}", real=True))
+        for function in PAIRS.get(type(node), (type(node),))[:2]:
+            found.setdefault(function(node.args[0]), Symbol(f"h{len(found)}"))
     return found
 
 
-def seeds_of(symbols: Symbols) -> dict[sympy.Symbol, sympy.Symbol]:
+def seeds_of(symbols: Symbols) -> dict[Symbol, Symbol]:
     """The component of a tangent vector that belongs to each state."""
-    return {x: sympy.Symbol(f"v{i}", real=True) for i, x in enumerate(symbols.x)}
+    return {x: Symbol(f"v{i}") for i, x in enumerate(symbols.x)}
 
 
 def names_of_state(symbols: Symbols) -> tuple[list[str], list[str]]:
@@ -74,7 +74,7 @@ class Body:
     """
 
     def __init__(
-        self, symbols: Symbols, guards: Sequence[sympy.Expr], others: Iterable[sympy.Symbol], time: str
+        self, symbols: Symbols, guards: Sequence[Expression], others: Iterable[Symbol], time: str
     ) -> None:
         self.symbols, self.time = symbols, time
         self.n = len(symbols.x)
@@ -83,13 +83,13 @@ class Body:
         self.rows = {symbol: self.allot() for symbol in others}
         self.constants = Constants()
         self.preamble: list[str] = []
-        self.at_start: dict[sympy.Expr, str] = {}
+        self.at_start: dict[Expression, str] = {}
 
     def column(self, place: int) -> str:
         """A column after those of the guards."""
         return str(self.behind_guards + place)
 
-    def start_root(self, name: str, z: sympy.Expr, order: int, place: int, *, goes_on: bool) -> None:
+    def start_root(self, name: str, z: Expression, order: int, place: int, *, goes_on: bool) -> None:
         """Statements for ``name``, the initial value of the root of ``z``, which is the guard in a place.
 
         With a speed of zero too, a root of zero would stay there. So a root that is small starts below the
@@ -97,7 +97,7 @@ class Body:
         A root that ``goes_on`` starts with its value at the end of the last step. Its error is as small as
         that of the speed of ``z``; near zero, the error of ``z`` itself would make a far larger one.
         """
-        size = sympy.Add(*(sympy.Abs(z.diff(x)) * sympy.Abs(x) for x in self.symbols.x))
+        size = add(*(Absolute(derivative(z, x)) * Absolute(x) for x in self.symbols.x))
         power = "*".join(["last"] * order)
         self.at_start[z] = "*".join([name] * order)
         least = f"max(z, {FLOOR}*size, 1e-300)"
@@ -120,14 +120,14 @@ class Body:
 
     def assemble(
         self,
-        names: Sequence[sympy.Symbol | None],
+        names: Sequence[Symbol | None],
         columns: list[str],
         starts: list[str],
-        rates: Sequence[sympy.Expr],
-        guards: Sequence[sympy.Expr],
-        trace: sympy.Expr,
-        tangents: Sequence[sympy.Expr],
-        seeds: dict[sympy.Symbol, sympy.Symbol],
+        rates: Sequence[Expression],
+        guards: Sequence[Expression],
+        trace: Expression,
+        tangents: Sequence[Expression],
+        seeds: dict[Symbol, Symbol],
     ) -> Series:
         """The series without and with tangent vectors.
 
@@ -161,11 +161,11 @@ class Body:
     def _state(
         self,
         prefix: str,
-        names: Sequence[sympy.Symbol | None],
+        names: Sequence[Symbol | None],
         columns: list[str],
         starts: list[str],
-        rates: Sequence[sympy.Expr],
-        guards: Sequence[sympy.Expr],
+        rates: Sequence[Expression],
+        guards: Sequence[Expression],
     ) -> StateLoop:
         """The loop of the state and of all other quantities in ``rates``; local names have a prefix."""
         state = {x: str(i) for i, x in enumerate(self.symbols.x)}

@@ -11,14 +11,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import attrs
-import sympy
 
 from hybrid.compiler.taylor.loops import indented, padded
+from hybrid.expression.constants import Constants
+from hybrid.expression.derivatives import partial_derivatives
+from hybrid.expression.graph import degree_of, mentions, replaced
+from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol, add
+from hybrid.expression.tracing import Symbols
 from hybrid.kernels.types.codes import NARROW
-from hybrid.symbolic.constants import Constants
-from hybrid.symbolic.derivatives import partial_derivatives
-from hybrid.symbolic.nodes import degree_of, mentions, replaced
-from hybrid.symbolic.tracing import Symbols
 
 # A larger table does not fit into the fastest memory, and products with it cost more than recurrences.
 LARGEST = 16
@@ -38,19 +38,19 @@ class LinearForm:
         The rows of ``C``.
     """
 
-    starts: list[sympy.Expr]
-    rates: list[list[sympy.Expr]]
-    guards: list[list[sympy.Expr]]
+    starts: list[Expression]
+    rates: list[list[Expression]]
+    guards: list[list[Expression]]
 
-    def trace(self, n: int) -> sympy.Expr:
+    def trace(self, n: int) -> Expression:
         """Divergence of the vector field."""
-        return sympy.Add(*(self.rates[i][i] for i in range(n)))
+        return add(*(self.rates[i][i] for i in range(n)))
 
 
 def linear_form(
-    field: Sequence[sympy.Expr],
-    guards: Sequence[sympy.Expr],
-    harmonics: dict[sympy.Expr, sympy.Symbol],
+    field: Sequence[Expression],
+    guards: Sequence[Expression],
+    harmonics: dict[Expression, Symbol],
     symbols: Symbols,
 ) -> LinearForm | None:
     """The linear form of an affine mode, if it has one; ``harmonics`` are the functions that drive it."""
@@ -61,19 +61,19 @@ def linear_form(
     rows = [_row(replaced(entry, harmonics), variables, symbols.t) for entry in (*field, *turning, *guards)]
     if any(row is None for row in rows):
         return None
-    starts = [*symbols.x, *harmonics, sympy.Integer(1)]
+    starts = [*symbols.x, *harmonics, ONE]
     whole = [row for row in rows if row is not None]
-    one = [sympy.Integer(0)] * len(starts)
+    one = [ZERO] * len(starts)
     return LinearForm(starts, [*whole[: len(variables)], one], whole[len(variables) :])
 
 
-def _row(entry: sympy.Expr, variables: Sequence[sympy.Symbol], time: sympy.Symbol) -> list[sympy.Expr] | None:
+def _row(entry: Expression, variables: Sequence[Symbol], time: Symbol) -> list[Expression] | None:
     """Coefficients of the variables, then the constant term; None if not affine in them alone."""
     # Derivatives alone do not tell: the derivative of a sign is zero too.
     if degree_of(entry, frozenset(variables)) is None:
         return None
     [slopes] = partial_derivatives([entry], variables)
-    rest = replaced(entry, dict.fromkeys(variables, sympy.Integer(0)))
+    rest = replaced(entry, dict.fromkeys(variables, ZERO))
     if any(mentions(each, (time, *variables)) for each in (*slopes, rest)):
         return None
     return [*slopes, rest]
@@ -122,7 +122,7 @@ def _entry(value: str, place: int, front: int) -> str:
     return f"store_down(out, o, table + c*{front} + {place}, {front}, {value})"
 
 
-def _product(row: Sequence[sympy.Expr], by: str, constants: Constants) -> str:
+def _product(row: Sequence[Expression], by: str, constants: Constants) -> str:
     """Text of the product of a row with ``z``, divided by ``by``, as a sum of two floats."""
     places = [i for i, each in enumerate(row) if each != 0]
     if not places:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-import sympy
-
 from hybrid.compiler.taylor.pairs import Layer, layers
 from hybrid.compiler.taylor.series import Recurrences
+from hybrid.expression.nodes import Expression, Symbol
 from hybrid.kernels.types.codes import NARROW, WIDE
 
 
@@ -40,9 +39,9 @@ class StateLoop:
 
     def __init__(
         self,
-        symbols: Sequence[sympy.Symbol | None],
+        symbols: Sequence[Symbol | None],
         targets: Sequence[str],
-        rates: Sequence[sympy.Expr],
+        rates: Sequence[Expression],
         starts: Sequence[str],
         block: Recurrences,
     ) -> None:
@@ -148,12 +147,12 @@ class TangentLoop:
     other; the operands of products with common factors follow.
     """
 
-    def __init__(self, seeds: Sequence[sympy.Symbol], block: Recurrences) -> None:
+    def __init__(self, seeds: Sequence[Symbol], block: Recurrences) -> None:
         block.rows |= {seed: f"v + {NARROW * i}" for i, seed in enumerate(seeds)}
         self.components, self.block = len(seeds), block
         self.values: list[str] = []
 
-    def compute(self, rates: Sequence[sympy.Expr]) -> None:
+    def compute(self, rates: Sequence[Expression]) -> None:
         """Write the recurrences of the rates; this also requests the series of the state that they need."""
         self.values = [self.block.coefficient(rate) for rate in rates]
 

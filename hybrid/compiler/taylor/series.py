@@ -11,30 +11,60 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-import sympy
-from sympy.codegen.cfunctions import expm1, log1p, log2, log10
-
 from hybrid.compiler.taylor.sums import Term, added
+from hybrid.expression.code import power_text
+from hybrid.expression.constants import Constants
+from hybrid.expression.derivatives import derivative
+from hybrid.expression.graph import mentions, nodes, symbols_of
+from hybrid.expression.nodes import (
+    ONE,
+    TWO,
+    ZERO,
+    Expression,
+    Symbol,
+    add,
+    factors_of,
+    is_negative,
+    is_whole,
+    multiply,
+    number,
+    power,
+    terms_of,
+)
+from hybrid.expression.operations import (
+    Arccos,
+    Arccosh,
+    Arcsin,
+    Arcsinh,
+    Arctan,
+    Arctanh,
+    Cos,
+    Cosh,
+    Exp,
+    Expm1,
+    Log,
+    Log1p,
+    Sin,
+    Sinh,
+    Tan,
+    Tanh,
+)
 from hybrid.kernels.types.codes import NARROW
-from hybrid.symbolic.constants import Constants
-from hybrid.symbolic.expressions import IN_OTHER_TERMS
-from hybrid.symbolic.nodes import mentions, nodes, operations_of, symbols_of
-from hybrid.symbolic.printer import MATH_FUNCTIONS, power_text
 
 # Functions whose derivatives consist of operations with recurrences.
 BY_DERIVATIVE = (
-    sympy.log, log1p, log2, log10, expm1,
-    sympy.asin, sympy.acos, sympy.atan, sympy.asinh, sympy.acosh, sympy.atanh,
+    Log, Log1p, Expm1,
+    Arcsin, Arccos, Arctan, Arcsinh, Arccosh, Arctanh,
 )  # fmt: skip
 # A pair of functions, and the sign in the derivative of the second: cos' = -sin, cosh' = sinh.
 PAIRS = {
-    sympy.sin: (sympy.sin, sympy.cos, "-"),
-    sympy.cos: (sympy.sin, sympy.cos, "-"),
-    sympy.sinh: (sympy.sinh, sympy.cosh, ""),
-    sympy.cosh: (sympy.sinh, sympy.cosh, ""),
+    Sin: (Sin, Cos, "-"),
+    Cos: (Sin, Cos, "-"),
+    Sinh: (Sinh, Cosh, ""),
+    Cosh: (Sinh, Cosh, ""),
 }
 # ``y' = (1 -+ y^2) u'``.
-OWN_SQUARE = {sympy.tanh: -1, sympy.tan: 1}
+OWN_SQUARE = {Tanh: -1, Tan: 1}
 
 # Longer inner sums are not expanded, since other expressions may need them too.
 MOST_TERMS = 4
@@ -80,16 +110,16 @@ class Recurrences:
 
     def __init__(
         self,
-        rows: dict[sympy.Symbol, str],
-        time: tuple[sympy.Symbol, str] | None,
+        rows: dict[Symbol, str],
+        time: tuple[Symbol, str] | None,
         allot: Callable[[], str],
         prefix: str,
         constants: Constants,
         known: Recurrences | None = None,
-        at_start: Mapping[sympy.Expr, str] | None = None,
+        at_start: Mapping[Expression, str] | None = None,
         lanes: bool = False,
     ) -> None:
-        self.rows: dict[sympy.Expr, str] = dict(rows)
+        self.rows: dict[Expression, str] = dict(rows)
         self.lanes = lanes
         self.time = time
         self.allot = allot
@@ -99,20 +129,20 @@ class Recurrences:
         self.at_start = at_start or {}
         self.first: list[str] = []
         self.higher: list[str] = []
-        self.pairs: dict[tuple[str, sympy.Expr], str] = {}
+        self.pairs: dict[tuple[str, Expression], str] = {}
         # The place of each pair.
-        self.places: dict[tuple[str, sympy.Expr], int] = {}
-        self.blocks: dict[str, list[sympy.Expr]] = {}
-        self.variables: dict[sympy.Expr, str] = {}
-        self.slopes: dict[sympy.Expr, str] = {}
-        self.shared: Counter[sympy.Expr] = Counter()
-        self.lateness: dict[sympy.Expr, int] = {}
-        self.readiness: dict[sympy.Expr, tuple[int, int]] = {}
+        self.places: dict[tuple[str, Expression], int] = {}
+        self.blocks: dict[str, list[Expression]] = {}
+        self.variables: dict[Expression, str] = {}
+        self.slopes: dict[Expression, str] = {}
+        self.shared: Counter[Expression] = Counter()
+        self.lateness: dict[Expression, int] = {}
+        self.readiness: dict[Expression, tuple[int, int]] = {}
         self.own = frozenset(rows)
         if known is None and time is not None:
             self.own |= {time[0]}
 
-    def expect(self, symbols: Iterable[sympy.Symbol | None], rates: Sequence[sympy.Expr]) -> None:
+    def expect(self, symbols: Iterable[Symbol | None], rates: Sequence[Expression]) -> None:
         """Analyse the rates of symbols before their recurrences are written.
 
         This counts the factors of products: a factor that many products share becomes their common
@@ -121,12 +151,12 @@ class Recurrences:
         self.readiness.clear()
         for symbol, rate in zip(symbols, rates, strict=True):
             if symbol is not None:
-                self.lateness[symbol] = operations_of(rate)
+                self.lateness[symbol] = rate.size
             for node in nodes(rate):
-                if node.is_Mul:
+                if node.is_product:
                     self.shared.update(node.args)
 
-    def coefficient(self, expression: sympy.Expr) -> str:
+    def coefficient(self, expression: Expression) -> str:
         """Text of the coefficient of order ``o``."""
         if expression in self.variables:
             return self.variables[expression]
@@ -138,7 +168,7 @@ class Recurrences:
             return self._bind(expression, self.constants.name(expression), "0.0")
         return self._operation(expression)
 
-    def row(self, expression: sympy.Expr) -> str:
+    def row(self, expression: Expression) -> str:
         """Text of the column that holds the series of the expression."""
         if expression in self.rows:
             return self.rows[expression]
@@ -161,15 +191,15 @@ class Recurrences:
             return f"store(out, {order}, {column}, {value})"
         return f"out[{order}, {column}] = {value}"
 
-    def _is_known(self, expression: sympy.Expr) -> bool:
+    def _is_known(self, expression: Expression) -> bool:
         return self.known is not None and not mentions(expression, self.own)
 
-    def _known_coefficient(self, expression: sympy.Expr) -> str:
+    def _known_coefficient(self, expression: Expression) -> str:
         assert self.known is not None
         row = self.known.row(expression)
         return self.known.variables.get(expression, f"out[o, {row}]")
 
-    def _is_constant(self, expression: sympy.Expr) -> bool:
+    def _is_constant(self, expression: Expression) -> bool:
         return not mentions(expression, self.own) and (
             self.known is None or self.known._is_constant(expression)
         )
@@ -178,7 +208,7 @@ class Recurrences:
         self.first.append(statement)
         self.higher.append(statement)
 
-    def _bind(self, expression: sympy.Expr, first: str, *higher: str, name: str | None = None) -> str:
+    def _bind(self, expression: Expression, first: str, *higher: str, name: str | None = None) -> str:
         """A variable for the expression: its value at order zero; above, its value and further statements."""
         name = name or self._name(expression)
         self.first.append(f"{name} = {self.at_start.get(expression, first)}")
@@ -186,19 +216,19 @@ class Recurrences:
         self.higher += [f"{name} = {value}", *more]
         return name
 
-    def _name(self, expression: sympy.Expr) -> str:
+    def _name(self, expression: Expression) -> str:
         return self.variables.setdefault(expression, f"{self.prefix}{len(self.variables)}")
 
-    def _kept(self, expression: sympy.Expr, column: str | None = None) -> tuple[str, str]:
+    def _kept(self, expression: Expression, column: str | None = None) -> tuple[str, str]:
         """Name and column of an expression whose recurrence reads its own earlier coefficients."""
         self.rows[expression] = column or self.allot()
         return self._name(expression), self.rows[expression]
 
-    def _store(self, *expressions: sympy.Expr) -> None:
+    def _store(self, *expressions: Expression) -> None:
         for expression in expressions:
             self._both(self.put("o", self.rows[expression], self.variables[expression]))
 
-    def _place(self, left: str, right: sympy.Expr) -> tuple[str, str]:
+    def _place(self, left: str, right: Expression) -> tuple[str, str]:
         """A convolution with the column ``left``, without both ends, and the column of the other factor."""
         if self.lanes:
             rights = self.blocks.setdefault(left, [])
@@ -216,21 +246,21 @@ class Recurrences:
         lefts = {left for left, _ in self.pairs}
         return lefts.pop() if len(lefts) == 1 else None
 
-    def _beside(self, left: str, right: sympy.Expr) -> tuple[str, str, str]:
+    def _beside(self, left: str, right: Expression) -> tuple[str, str, str]:
         """The results of ``_place`` and the coefficient of the other factor, written to its column."""
         value = self.coefficient(right)
         inner, column = self._place(left, right)
         self._enter(left, right, column, value)
         return inner, column, value
 
-    def _enter(self, left: str, right: sympy.Expr, column: str, value: str) -> None:
+    def _enter(self, left: str, right: Expression, column: str, value: str) -> None:
         """Give a convolution the coefficient of its other factor; all pairs are written together."""
         if self.lanes:
             self._both(self.put("o", column, value))
         else:
             self.pairs[left, right] = value
 
-    def _slope(self, u: sympy.Expr) -> str:
+    def _slope(self, u: Expression) -> str:
         """Column of ``o`` times the coefficients of ``u``: those of the derivative, shifted by one order."""
         if u not in self.slopes:
             value = self.coefficient(u)
@@ -238,115 +268,115 @@ class Recurrences:
             self._both(f"out[o, {self.slopes[u]}] = o*{value}")
         return self.slopes[u]
 
-    def _operation(self, expression: sympy.Expr) -> str:
+    def _operation(self, expression: Expression) -> str:
         if self.time is not None and expression == self.time[0]:
             return self._bind(expression, "t", self.time[1])
-        if expression.is_Add:
+        if expression.is_sum:
             return self._sum(expression)
-        if expression.is_Mul:
+        if expression.is_product:
             return self._product(expression)
-        if expression.is_Pow:
+        if expression.is_power:
             return self._power(expression)
-        if isinstance(expression, sympy.exp):
+        if isinstance(expression, Exp):
             return self._exponential(expression, expression.args[0])
-        if expression.func in PAIRS:
+        if type(expression) in PAIRS:
             return self._pair(expression)
-        if expression.func in OWN_SQUARE:
+        if type(expression) in OWN_SQUARE:
             return self._own_square(expression)
-        if expression.func in IN_OTHER_TERMS:
-            text = self.coefficient(IN_OTHER_TERMS[expression.func](*expression.args))
+        if expression.in_other_terms is not None:
+            text = self.coefficient(expression.in_other_terms(*expression.args))
             return self._bind(expression, text, text)
         if isinstance(expression, BY_DERIVATIVE):
             return self._by_derivative(expression)
         raise NoSeries(f"{type(expression).__name__} is not analytic")
 
-    def _sum(self, expression: sympy.Expr) -> str:
+    def _sum(self, expression: Expression) -> str:
         terms = self._terms(expression)
-        constant = sympy.Add(*(factor for factor, rest in terms if rest == 1))
-        moving = [(factor, rest) for factor, rest in terms if rest != 1]
+        constant = add(*(factor for factor, rest in terms if rest is ONE))
+        moving = [(factor, rest) for factor, rest in terms if rest is not ONE]
         first = added([self._times(*term) for term in moving])
-        if constant != 0:
+        if constant is not ZERO:
             first = f"{first} + {self.constants.name(constant)}"
         return self._bind(expression, first, added([self._higher_times(*term) for term in moving]))
 
-    def _terms(self, expression: sympy.Expr) -> list[tuple[sympy.Expr, sympy.Expr]]:
+    def _terms(self, expression: Expression) -> list[tuple[Expression, Expression]]:
         """The terms of a sum as pairs of a constant factor and a varying factor; inner sums are expanded.
 
         Otherwise each level of nested sums would wait for the level below. A difference of states, whose
         digits may cancel, is not expanded.
         """
         found = []
-        for factor, rest in map(self._split, sympy.Add.make_args(expression)):
+        for factor, rest in map(self._split, terms_of(expression)):
             if self._comes_apart(rest):
                 found += [(factor * each, moving) for each, moving in self._terms(rest)]
             else:
                 found.append((factor, rest))
         return found
 
-    def _comes_apart(self, rest: sympy.Expr) -> bool:
+    def _comes_apart(self, rest: Expression) -> bool:
         at_hand = self._is_known(rest) or rest in self.variables or rest in self.rows
-        if not rest.is_Add or at_hand or len(rest.args) > MOST_TERMS:
+        if not rest.is_sum or at_hand or len(rest.args) > MOST_TERMS:
             return False
         return not all(self._is_constant(term) or self._is_plain(*self._split(term)) for term in rest.args)
 
     @staticmethod
-    def _is_plain(factor: sympy.Expr, rest: sympy.Expr) -> bool:
-        return rest.is_Symbol and factor in (1, -1)
+    def _is_plain(factor: Expression, rest: Expression) -> bool:
+        return rest.is_symbol and factor in (1, -1)
 
-    def _split(self, term: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
+    def _split(self, term: Expression) -> tuple[Expression, Expression]:
         """The product of the constant factors of a term, and that of the others."""
-        factors = sympy.Mul.make_args(term)
+        factors = factors_of(term)
         constant = [factor for factor in factors if self._is_constant(factor)]
-        return sympy.Mul(*constant), sympy.Mul(*(factor for factor in factors if factor not in constant))
+        return multiply(*constant), multiply(*(factor for factor in factors if factor not in constant))
 
-    def _times(self, constant: sympy.Expr, rest: sympy.Expr) -> Term:
+    def _times(self, constant: Expression, rest: Expression) -> Term:
         text = self.coefficient(rest)
         if constant != 1:
             text = f"{self.constants.name(constant)}*{text}"
         return Term(self._ready(rest), text, constant != 1)
 
-    def _higher_times(self, constant: sympy.Expr, rest: sympy.Expr) -> Term:
+    def _higher_times(self, constant: Expression, rest: Expression) -> Term:
         """``_times`` above order zero, where a sum with one varying term is a multiple of that term."""
         self.coefficient(rest)
-        while rest.is_Add or rest.is_Mul:
-            moving = [each for each in sympy.Add.make_args(rest) if not self._is_constant(each)]
+        while rest.is_sum or rest.is_product:
+            moving = [each for each in terms_of(rest) if not self._is_constant(each)]
             factor, inner = self._split(moving[0])
             if len(moving) > 1 or (factor == 1 and inner == rest):
                 break
             constant, rest = constant * factor, inner
         return self._times(constant, rest)
 
-    def _ready(self, expression: sympy.Expr) -> tuple[int, int]:
+    def _ready(self, expression: Expression) -> tuple[int, int]:
         """When a coefficient is known: operations after the states, and lateness of the states."""
-        if expression.is_Symbol:
+        if expression.is_symbol:
             return 1, self.lateness.get(expression, 0)
         if expression not in self.readiness:
             moving = [each for each in expression.args if not self._is_constant(each)]
             depth, late = 0, 0
             if moving and not self._is_known(expression):
                 depth, late = max(map(self._ready, moving))
-                depth += 1 if expression.is_Add or expression.is_Mul else 2
+                depth += 1 if expression.is_sum or expression.is_product else 2
             self.readiness[expression] = depth, late
         return self.readiness[expression]
 
-    def _product(self, expression: sympy.Expr) -> str:
+    def _product(self, expression: Expression) -> str:
         factors = expression.args
         if any(self._is_constant(factor) for factor in factors):
             term = self._split(expression)
             return self._bind(expression, self._times(*term).text, self._higher_times(*term).text)
-        below = [f for f in factors if f.is_Pow and f.exp.is_Number and f.exp.is_negative]
+        below = [f for f in factors if f.is_power and is_negative(f.exponent)]
         # A known divisor becomes a factor: the series of its reciprocal is stored.
         below = [f for f in below if self.known is None or mentions(f, self.own)]
         if below and len(below) < len(factors):
-            above = sympy.Mul(*(f for f in factors if f not in below))
-            return self._quotient(expression, above, sympy.Mul(*(1 / f for f in below)))
+            above = multiply(*(f for f in factors if f not in below))
+            return self._quotient(expression, above, multiply(*(1 / f for f in below)))
         if len(below) > 1:
-            return self._quotient(expression, None, sympy.Mul(*(1 / f for f in below)))
+            return self._quotient(expression, None, multiply(*(1 / f for f in below)))
         # The first factor is a known one, or else the one that most products share.
         *others, last = sorted(factors, key=lambda factor: (-mentions(factor, self.own), self.shared[factor]))
-        return self._convolution(expression, last, sympy.Mul(*others))
+        return self._convolution(expression, last, multiply(*others))
 
-    def _convolution(self, expression: sympy.Expr, a: sympy.Expr, b: sympy.Expr) -> str:
+    def _convolution(self, expression: Expression, a: Expression, b: Expression) -> str:
         left = self.row(a)
         factor = self._known_coefficient(a) if self._is_known(a) else self.coefficient(a)
         inner, right, value = self._beside(left, b)
@@ -357,7 +387,7 @@ class Recurrences:
             f"{inner} + {factor}*{first} + out[0, {left}]*{value}",
         )
 
-    def _quotient(self, expression: sympy.Expr, above: sympy.Expr | None, below: sympy.Expr) -> str:
+    def _quotient(self, expression: Expression, above: Expression | None, below: Expression) -> str:
         text = None if above is None else self.coefficient(above)
         divisor, value = self.row(below), self.coefficient(below)
         inner, column = self._place(divisor, expression)
@@ -373,16 +403,16 @@ class Recurrences:
         self._enter(divisor, expression, column, name)
         return name
 
-    def _power(self, expression: sympy.Expr) -> str:
+    def _power(self, expression: Expression) -> str:
         base, exponent = expression.args
         if not self._is_constant(exponent):
-            return self._bind(expression, *2 * (self.coefficient(sympy.exp(exponent * sympy.log(base))),))
-        if exponent.is_Integer and exponent.is_negative:
-            return self._quotient(expression, None, base**-exponent)
-        if exponent.is_Integer:
-            half = base ** (exponent // 2)
+            return self._bind(expression, *2 * (self.coefficient(Exp(exponent * Log(base))),))
+        if is_whole(exponent) and is_negative(exponent):
+            return self._quotient(expression, None, power(base, -exponent))
+        if is_whole(exponent):
+            half = power(base, number(exponent.value // 2))
             return self._convolution(
-                expression, *((base, base ** (exponent - 1)) if exponent.p % 2 else (half, half))
+                expression, *((base, power(base, exponent - 1)) if exponent.value % 2 else (half, half))
             )
         u, slope, k = self.row(base), self._slope(base), self.constants.name(exponent)
         value = self.coefficient(base)
@@ -399,16 +429,16 @@ class Recurrences:
         self._enter(slope, expression, copy, name)
         return name
 
-    def _rate(self, u: sympy.Expr) -> str | None:
+    def _rate(self, u: Expression) -> str | None:
         """The constant rate of an argument that is linear in time; None for other arguments."""
         if self.time is None or self.time[1] != ONE_THEN_ZERO:
             return None
         if symbols_of(u) & self.own - {self.time[0]}:
             return None
-        slope = u.diff(self.time[0])
+        slope = derivative(u, self.time[0])
         return self.constants.name(slope) if self._is_constant(slope) else None
 
-    def _exponential(self, expression: sympy.Expr, u: sympy.Expr) -> str:
+    def _exponential(self, expression: Expression, u: Expression) -> str:
         rate = self._rate(u)
         argument = self.coefficient(u)
         if rate:
@@ -424,10 +454,10 @@ class Recurrences:
         self._enter(slope, expression, column, name)
         return name
 
-    def _pair(self, expression: sympy.Expr) -> str:
-        odd, even, sign = PAIRS[expression.func]
+    def _pair(self, expression: Expression) -> str:
+        odd, even, sign = PAIRS[type(expression)]
         (u,) = expression.args
-        s, c = odd(u, evaluate=False), even(u, evaluate=False)
+        s, c = odd(u), even(u)
         rate = self._rate(u)
         argument = self.coefficient(u)
         if rate:
@@ -441,7 +471,7 @@ class Recurrences:
                 f"({c_sum} + out[o, {slope}]*out[0, {c_column}])*shrink",
                 f"{sign}({s_sum} + out[o, {slope}]*out[0, {s_column}])*shrink",
             ]
-        self.first += [f"{s_name} = {odd.__name__}({argument})", f"{c_name} = {even.__name__}({argument})"]
+        self.first += [f"{s_name} = {odd.code}({argument})", f"{c_name} = {even.code}({argument})"]
         self.higher += [f"{s_name} = {values[0]}", f"{c_name} = {values[1]}"]
         if rate:
             self._store(s, c)
@@ -450,16 +480,16 @@ class Recurrences:
             self._enter(slope, c, c_column, c_name)
         return self.variables[expression]
 
-    def _own_square(self, expression: sympy.Expr) -> str:
-        sign = OWN_SQUARE[expression.func]
+    def _own_square(self, expression: Expression) -> str:
+        sign = OWN_SQUARE[type(expression)]
         (u,) = expression.args
         argument, rate = self.coefficient(u), self._slope(u)
-        slope = 1 + sign * expression**2
+        slope = 1 + sign * power(expression, TWO)
         moving, slope_column = self._place(rate, slope)
         name, row = self._kept(expression)
         slope_name, _ = self._kept(slope, slope_column)
         inner, copy = self._place(row, expression)
-        self.first.append(f"{name} = {expression.func.__name__}({argument})")
+        self.first.append(f"{name} = {expression.code}({argument})")
         self.higher.append(f"{name} = ({moving} + out[o, {rate}]*out[0, {slope_column}])*shrink")
         self._store(expression)
         self._enter(row, expression, copy, name)
@@ -468,13 +498,13 @@ class Recurrences:
         self._enter(rate, slope, slope_column, slope_name)
         return name
 
-    def _by_derivative(self, expression: sympy.Expr) -> str:
+    def _by_derivative(self, expression: Expression) -> str:
         (u,) = expression.args
         argument, rate = self.coefficient(u), self._slope(u)
-        inner, slope, _ = self._beside(rate, expression.fdiff())
+        inner, slope, _ = self._beside(rate, expression.slope())
         return self._bind(
             expression,
-            f"{MATH_FUNCTIONS[expression.func]}({argument})",
+            f"{expression.code}({argument})",
             f"({inner} + out[o, {rate}]*out[0, {slope}])*shrink",
         )
 

@@ -89,7 +89,7 @@ class Family:
         if not callable(self.system.period):
             return np.zeros(len(values))
         if self._slopes is not None:
-            return self.periods * np.array([float(each(*self.vector(values))) for each in self._slopes])
+            return self.periods * np.array(self._slopes(0.0, (), self.vector(values)))
         found = []
         for j, value in enumerate(values):
             h = STEP * (abs(value) or 1.0) * np.eye(len(values))[j]
@@ -97,21 +97,21 @@ class Family:
         return np.array(found)
 
     @cached_property
-    def _slopes(self) -> list[Callable[..., float]] | None:
+    def _slopes(self) -> Callable[..., Any] | None:
         """The derivatives of the forcing period, if it can be traced."""
-        import sympy
-
-        from hybrid.symbolic.tracing import TraceError, model_symbols, trace
+        from hybrid.expression.derivatives import derivative
+        from hybrid.expression.evaluation import expressed
+        from hybrid.expression.tracing import TraceError, model_symbols, trace
 
         period: Any = self.system.period
         names = tuple(self.system.parameters)
         try:
-            (expression,) = trace(lambda t, x, p: period(p), self.system.state, names)
+            (expression,) = trace(lambda t, x, p: period(p), 0, names)
         except TraceError:
             return None
         symbols = model_symbols(self.system.dimension, len(names)).p
         wanted = [symbols[names.index(name)] for name in self.names]
-        return [sympy.lambdify(symbols, sympy.diff(expression, each), "math") for each in wanted]
+        return expressed([derivative(expression, each) for each in wanted])
 
     def around(self, loop: Loop) -> Pass | None:
         """One pass from these unknowns; None if a stretch does not reach its end."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hybrid.compiler.curvature import UNKNOWN, curvature
-from hybrid.symbolic.tracing import model_symbols, trace
+from hybrid.expression.tracing import model_symbols, trace
 
 GUARDS = {
     "quadratic": lambda t, x, p: x.a**2 - p.c * x.a * x.b + t * x.b,

@@ -16,8 +16,8 @@ from hybrid.compiler.cache.store import models_folder
 from hybrid.compiler.compiled import emitted_of
 from hybrid.compiler.emit import emit
 from hybrid.compiler.operations import operations_of
-from hybrid.symbolic.ufuncs import RULES
-from hybrid.symbolic.values import UFUNCS, WHERE
+from hybrid.expression.ufuncs import RULES
+from hybrid.expression.values import UFUNCS, WHERE
 
 MODELS = [
     models.ball_chain,

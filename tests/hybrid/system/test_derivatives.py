@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from hybrid.errors import ModelError
-from hybrid.symbolic.derivatives import jacobian_of
-from hybrid.symbolic.tracing import model_symbols, trace
+from hybrid.expression.derivatives import jacobian_of
+from hybrid.expression.tracing import model_symbols, trace
 from hybrid.system.derivatives import (
     DIFFERENCE_STEP,
     _central_difference,

@@ -6,7 +6,7 @@ from hypothesis.errors import UnsatisfiedAssumption
 
 import models
 from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
-from hybrid.symbolic.reads import names_read
+from hybrid.expression.reads import names_read
 from hybrid.testing import PropertyError, check_reads, check_system
 from hybrid.testing.reads import is_passed
 

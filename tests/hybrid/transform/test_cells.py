@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hybrid import HybridSystem, Mode
-from hybrid.symbolic.evaluation import scalar
+from hybrid.expression.evaluation import scalar
 from hybrid.system.derivatives import evaluate
 from hybrid.transform.splitter import Splitter
 

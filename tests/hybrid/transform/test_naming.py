@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from hybrid import HybridSystem, Mode
-from hybrid.symbolic.evaluation import Program
-from hybrid.symbolic.expressions import Level
-from hybrid.symbolic.nodes import nodes_of
+from hybrid.expression.evaluation import Program
+from hybrid.expression.expressions import Level
+from hybrid.expression.nodes import nodes_of
 from hybrid.transform.naming import LONGEST
 from hybrid.transform.splitter import Splitter
 

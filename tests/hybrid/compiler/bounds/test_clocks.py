@@ -7,7 +7,7 @@ import pytest
 
 from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Reset, Taylor, Transition, Tsit5, simulate
 from hybrid.compiler.bounds.forcing import times_of
-from hybrid.symbolic.tracing import model_symbols
+from hybrid.expression.tracing import model_symbols
 
 SOLVERS = (Taylor(), DOP853(), RadauIIA(rtol=1e-8, atol=1e-10), Tsit5(rtol=1e-8, atol=1e-10))
 each_solver = pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: type(solver).__name__)

@@ -25,8 +25,8 @@ from hybrid import (
 )
 from hybrid.compiler.bounds.forcing import forcings
 from hybrid.kernels.types.codes import ARGUMENTS
-from hybrid.symbolic.expressions import Absolute, Maximum
-from hybrid.symbolic.tracing import model_symbols
+from hybrid.expression.expressions import Absolute, Maximum
+from hybrid.expression.tracing import model_symbols
 
 SOLVERS = (Taylor(), DOP853(), RadauIIA(rtol=1e-8, atol=1e-10), Tsit5(rtol=1e-8, atol=1e-10))
 # Pulses as functions of time, with a height ``A``, a place ``a`` and a width ``w``.

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from hybrid import DOP853, HybridSystem, Mode, RadauIIA, Taylor, Tsit5, simulate
 from hybrid.compiler.bounds.forcing import FACTORS_OF_HARMONIC, MOST_FACTORS, is_harmless
-from hybrid.symbolic.tracing import model_symbols, trace
-from hybrid.symbolic.values import UFUNCS
+from hybrid.expression.tracing import model_symbols, trace
+from hybrid.expression.values import UFUNCS
 
 SOLVERS = (Taylor(), DOP853(), RadauIIA(rtol=1e-8, atol=1e-10), Tsit5(rtol=1e-8, atol=1e-10))
 T = model_symbols(1, 0).t

@@ -8,7 +8,7 @@ import sympy
 
 from hybrid.compiler.bounds.program import programs
 from hybrid.kernels.arithmetic import operations as op
-from hybrid.symbolic.tracing import model_symbols, trace
+from hybrid.expression.tracing import model_symbols, trace
 
 SYMBOLS = model_symbols(2, 1)
 T, Q, V, K = 0.8, 0.45, -1.3, 1.7

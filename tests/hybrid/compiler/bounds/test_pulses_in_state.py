@@ -11,8 +11,8 @@ from scipy.integrate import quad
 from hybrid import DOP853, HybridSystem, Mode, RadauIIA, Taylor, Tsit5, simulate
 from hybrid.compiler.bounds.forcing import Forcing, forcings
 from hybrid.kernels.types.codes import ARGUMENTS, TERMS
-from hybrid.symbolic.expressions import Absolute, Maximum, Minimum
-from hybrid.symbolic.tracing import model_symbols
+from hybrid.expression.expressions import Absolute, Maximum, Minimum
+from hybrid.expression.tracing import model_symbols
 
 SOLVERS = {"Taylor": Taylor(), "DOP853": DOP853(), "Tsit5": Tsit5(), "RadauIIA": RadauIIA()}
 # Bumps of the height and width one, and their integrals from one side to the other.

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import hybrid
 from hybrid.compiler.bounds.residues import residue_of_guard
 from hybrid.compiler.compiled import compile_system
-from hybrid.symbolic.tracing import model_symbols, trace
+from hybrid.expression.tracing import model_symbols, trace
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 

@@ -11,8 +11,8 @@ from hybrid.compiler.llvm.calls import NUMBER, WHOLE
 from hybrid.compiler.llvm.lowering import MATRIX_SIGNATURE, VECTOR_SIGNATURE, LoweringError, parsed
 from hybrid.compiler.llvm.machine import machine_code
 from hybrid.kernels.types.numba_door.builder import Builder
-from hybrid.symbolic import expressions as sym
-from hybrid.symbolic.printer import MATH_FUNCTIONS, assignments, power_text
+from hybrid.expression import expressions as sym
+from hybrid.expression.printer import MATH_FUNCTIONS, assignments, power_text
 from tests.hybrid.text import both
 
 X = np.array([0.7, -1.3, 0.0, 2.5])

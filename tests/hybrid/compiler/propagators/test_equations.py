@@ -5,8 +5,8 @@ import sympy
 
 from hybrid.compiler.propagators.equations import Boundary, equations_of, in_terms_of_root, known_positive
 from hybrid.compiler.taylor.series import NoSeries
-from hybrid.symbolic.expressions import Absolute, Maximum, Sign
-from hybrid.symbolic.tracing import model_symbols
+from hybrid.expression.expressions import Absolute, Maximum, Sign
+from hybrid.expression.tracing import model_symbols
 
 SYMBOLS = model_symbols(2, 2)
 (X, Y), (A, B), T = SYMBOLS.x, SYMBOLS.p, SYMBOLS.t

@@ -6,7 +6,7 @@ import sympy
 from hybrid.compiler.propagators.equations import Boundary, equations_of
 from hybrid.compiler.propagators.polynomial import polynomial
 from hybrid.kernels.types.codes import EXACT
-from hybrid.symbolic.tracing import model_symbols
+from hybrid.expression.tracing import model_symbols
 
 SYMBOLS = model_symbols(3, 2)
 (X, Y, Z), (A, B), T = SYMBOLS.x, SYMBOLS.p, SYMBOLS.t

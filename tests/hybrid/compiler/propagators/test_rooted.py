@@ -8,7 +8,7 @@ from hybrid.compiler.propagators.equations import Boundary, equations_of
 from hybrid.compiler.propagators.rooted import rooted
 from hybrid.compiler.taylor.series import NoSeries
 from hybrid.kernels.types.codes import DESINGULARISED, FROM_LAST_STEP, ROOTED
-from hybrid.symbolic.tracing import model_symbols
+from hybrid.expression.tracing import model_symbols
 
 SYMBOLS = model_symbols(2, 1)
 (H, K), [A] = SYMBOLS.x, SYMBOLS.p

@@ -7,7 +7,7 @@ from sympy.codegen.cfunctions import hypot
 from hybrid.compiler.propagators.equations import Boundary, equations_of
 from hybrid.compiler.propagators.taylor import taylor
 from hybrid.kernels.types.codes import TAYLOR
-from hybrid.symbolic.tracing import model_symbols
+from hybrid.expression.tracing import model_symbols
 
 SYMBOLS = model_symbols(2, 1)
 (X, Y), T = SYMBOLS.x, SYMBOLS.t

@@ -4,8 +4,8 @@ import pytest
 import sympy
 
 from hybrid.compiler.taylor.linear import LARGEST, linear_form
-from hybrid.symbolic.expressions import Sign
-from hybrid.symbolic.tracing import model_symbols
+from hybrid.expression.expressions import Sign
+from hybrid.expression.tracing import model_symbols
 
 SYMBOLS = model_symbols(2, 2)
 (Q, V), (K, W), T = SYMBOLS.x, SYMBOLS.p, SYMBOLS.t

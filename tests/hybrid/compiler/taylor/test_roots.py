@@ -11,7 +11,7 @@ from hybrid import Guard, HybridSystem, Mode, StatusCode, Transition
 from hybrid.compiler.taylor import roots
 from hybrid.compiler.taylor.roots import ROOT, is_multiple
 from hybrid.kernels.types import codes
-from hybrid.symbolic.tracing import model_symbols
+from hybrid.expression.tracing import model_symbols
 
 symbols = model_symbols(2, 2)
 

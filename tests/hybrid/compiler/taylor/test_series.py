@@ -12,7 +12,7 @@ from hybrid.compiler.taylor import pairs
 from hybrid.compiler.taylor.series import Recurrences
 from hybrid.compiler.taylor.sums import Term, added
 from hybrid.kernels.types.codes import DESINGULARISED, EXACT, NARROW, RUNGE_KUTTA, TAYLOR
-from hybrid.symbolic.constants import Constants
+from hybrid.expression.constants import Constants
 
 ORDER = 9
 A = 1.375

@@ -1,0 +1,250 @@
+"""Derivatives of expressions by the chain rule: all partial derivatives, or one along a vector.
+
+Every node is differentiated once, with the slopes of ``hybrid.expression.operations``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from hybrid.expression.graph import contains, once
+from hybrid.expression.nodes import (
+    HALF,
+    MINUS_ONE,
+    ONE,
+    ZERO,
+    Expression,
+    Symbol,
+    add,
+    in_order,
+    multiply,
+    number,
+    power,
+    split,
+)
+from hybrid.expression.operations import (
+    Cosh,
+    Equal,
+    Exp,
+    Gate,
+    Hypot,
+    Log,
+    Maximum,
+    Select,
+    Step,
+    Tanh,
+)
+from hybrid.expression.ranges import range_of
+
+Partials = Mapping[Symbol, Expression]
+# A derivative as a sum: each argument, and the factor of its derivative.
+Terms = list[tuple[Expression, Expression]]
+# A length below this is zero in the slope of a length.
+SMALLEST_LENGTH = number(1e-300)
+
+
+def jacobian_of(expressions: Iterable[Expression], variables: Iterable[Symbol]) -> list[list[Expression]]:
+    """Rows of the derivatives of ``expressions`` with respect to ``variables`` (states, then time).
+
+    At a kink ``np.maximum`` and ``np.minimum`` have the mean of both slopes, ``np.abs`` has slope zero,
+    and so has the length ``np.hypot`` at the origin. Piecewise constant functions have slope zero.
+    """
+    rows = partial_derivatives(expressions, list(variables))
+    return [[entry if entry is ZERO else close_gates(defined_at_origin(entry)) for entry in row] for row in rows]
+
+
+def partial_derivatives(
+    expressions: Iterable[Expression], variables: Sequence[Symbol]
+) -> list[list[Expression]]:
+    """Rows of the partial derivatives of ``expressions`` with respect to ``variables``."""
+    wanted = frozenset(variables)
+    rows = (_partials(expression, wanted) for expression in expressions)
+    return [[row.get(each, ZERO) for each in variables] for row in rows]
+
+
+def derivative(expression: Expression, variable: Symbol) -> Expression:
+    """The derivative in one variable."""
+    return _partials(expression, frozenset((variable,))).get(variable, ZERO)
+
+
+def divergence(field: Sequence[Expression], variables: Sequence[Symbol]) -> Expression:
+    """Divergence of a field: the sum of the derivatives of each rate in its own variable."""
+    return add(*(row[i] for i, row in enumerate(partial_derivatives(field, variables))))
+
+
+@once
+def _partials(expression: Expression, wanted: frozenset[Symbol]) -> Partials:
+    """The nonzero partial derivatives of an expression."""
+    mask = 0
+    for each in wanted:
+        mask |= each.mask
+    known: dict[Expression, dict[Symbol, Expression]] = {}
+    for node in in_order([expression]):
+        if not node.mask & mask:
+            known[node] = {}
+        elif isinstance(node, Symbol):
+            known[node] = {node: ONE}
+        else:
+            known[node] = _from_arguments(node, known)
+    return known[expression]
+
+
+def _from_arguments(
+    node: Expression, known: Mapping[Expression, dict[Symbol, Expression]]
+) -> dict[Symbol, Expression]:
+    """The partial derivatives of a node from those of its arguments."""
+    if isinstance(node, Select):
+        condition, one, other = node.args
+        pair = known[one], known[other]
+        found = {v: Select(condition, *(each.get(v, ZERO) for each in pair)) for v in {**pair[0], **pair[1]}}
+        return {v: each for v, each in found.items() if each is not ZERO}
+    terms: dict[Symbol, list[Expression]] = {}
+    for argument, factor in _slopes(node, known):
+        for v, part in known[argument].items():
+            terms.setdefault(v, []).append(multiply(factor, part))
+    sums = {v: add(*each) for v, each in terms.items()}
+    return {v: total for v, total in sums.items() if total is not ZERO}
+
+
+def _slopes(node: Expression, moving: Mapping[Expression, object]) -> Terms:
+    """The arguments of a node that vary, each with the derivative of the node in it."""
+    decays = _decays(node)
+    if decays:
+        return decays
+    args = node.args
+    if node.is_sum:
+        return [(each, ONE) for each in args if moving[each]]
+    if node.is_product:
+        return [
+            (each, multiply(*args[:place], *args[place + 1 :])) for place, each in enumerate(args) if moving[each]
+        ]
+    return [(each, _slope(node, place)) for place, each in enumerate(args) if moving[each]]
+
+
+def _slope(node: Expression, place: int) -> Expression:
+    """The derivative of a power or a function in one of its arguments."""
+    if not node.is_power:
+        return node.slope(place)
+    base, exponent = node.args
+    if place == 0:
+        return multiply(exponent, power(base, exponent - 1))
+    # A power of zero has slope zero, not 0*inf.
+    positive = range_of(base).positive
+    return multiply(node, Log(base if positive else Select(Equal(base, ZERO), ONE, base)))
+
+
+def directional(expressions: Iterable[Expression], seeds: Mapping[Symbol, Symbol]) -> list[Expression]:
+    """Derivatives along a vector, with one seed per symbol; common factors stay together."""
+    expressions = [*expressions]
+    along: dict[Expression, Expression] = {}
+    for node in in_order(expressions):
+        if isinstance(node, Symbol):
+            along[node] = seeds.get(node, ZERO)
+        elif isinstance(node, Select):
+            along[node] = Select(node.args[0], *(along[each] for each in node.args[1:]))
+        else:
+            moving = {each: None if along[each] is ZERO else each for each in node.args}
+            if not any(moving.values()):
+                along[node] = ZERO
+                continue
+            terms = _slopes(node, moving)
+            along[node] = add(*(multiply(factor, along[each]) for each, factor in terms))
+    return [along[each] for each in expressions]
+
+
+@once
+def _decays(expression: Expression) -> Terms:
+    """The derivative of a negative power of exponentials in terms of their arguments; empty for the others.
+
+    Where the exponentials overflow, the power is zero, and so is its derivative. The chain rule would divide
+    one infinity by another there. Of ``1/cosh(a)``, the factor of ``a'`` is ``-tanh(a)/cosh(a)``; of
+    ``1/(1 + exp(a))`` it is ``-1/(1 + exp(a))/(1 + exp(-a))``.
+    """
+    if not (expression.is_power and expression.exponent.is_number and expression.exponent.value < 0):
+        return []
+    base, factor = expression.base, expression.exponent * expression
+    if isinstance(base, Cosh):
+        return [(base.args[0], factor * Tanh(base.args[0]))]
+    terms = [_exponential(term) for term in base.args] if base.is_sum else []
+    if not terms or any(size is ZERO for size, _ in terms):
+        return []
+    return [
+        (argument, factor / add(*(b / a * Exp(other - argument) for b, other in terms)))
+        for a, argument in terms
+        if argument is not ZERO
+    ]
+
+
+def _exponential(term: Expression) -> tuple[Expression, Expression]:
+    """``a`` and ``u`` of a term ``a*exp(u)`` with a positive number ``a``; zeros of another term."""
+    size, rest = split(term)
+    if not size > 0 or not (rest is ONE or isinstance(rest, Exp)):
+        return ZERO, ZERO
+    return number(size), ZERO if rest is ONE else rest.args[0]
+
+
+@once
+def defined_at_origin(expression: Expression) -> Expression:
+    """Make slopes of lengths zero, not 0/0, where the length is zero.
+
+    ``u*hypot(u, w)``, a drag, has the slope ``hypot(u, w) + u*u/hypot(u, w)``, which is 0 at the origin. The
+    same for roots of sums of squares.
+    """
+    changed: dict[Expression, Expression] = {}
+    for node in in_order([expression]):
+        args = [changed[each] for each in node.args]
+        if node.is_power and _is_over_length(*node.args):
+            args[0] = Maximum(args[0], SMALLEST_LENGTH)
+        same = all(new is old for new, old in zip(args, node.args, strict=True))
+        changed[node] = node if same else node.rebuilt(args)
+    return changed[expression]
+
+
+def _is_over_length(base: Expression, exponent: Expression) -> bool:
+    """Whether a power is one over a length; of a sum, over its root."""
+    if isinstance(base, Hypot):
+        return exponent is MINUS_ONE
+    return exponent is -HALF and base.is_sum and all(map(_is_square, base.args))
+
+
+def _is_square(term: Expression) -> bool:
+    """Whether a term of a sum is an even power, or a positive multiple of one."""
+    factor, rest = split(term)
+    even = rest.is_power and rest.exponent.is_number and rest.exponent.is_whole
+    return factor > 0 and even and rest.exponent.value % 2 == 0
+
+
+@once
+def close_gates(expression: Expression) -> Expression:
+    """Make products zero where a factor switches them off, even if another factor is infinite there.
+
+    The slope of ``max(z, 0)**(1/4)`` is ``max(z, 0)**(-3/4)/4 * Step(z)``: 0 for ``z < 0``, never
+    ``inf*0``.
+    """
+    if not contains(expression, (Step, Select)):
+        return expression
+    closed: dict[Expression, Expression] = {}
+    for node in in_order([expression]):
+        args = [closed[each] for each in node.args]
+        if contains(node, (Step, Select)):
+            closed[node] = _closed_product(args) if node.is_product else node.rebuilt(args)
+        else:
+            closed[node] = node
+    return closed[expression]
+
+
+def _closed_product(factors: Sequence[Expression]) -> Expression:
+    product = multiply(*(factor for factor in factors if not _switches(factor)))
+    for factor in factors:
+        if isinstance(factor, Step) and product is not ONE:
+            product = Gate(factor.args[0], product)
+        elif isinstance(factor, Step):
+            product = factor
+        elif _switches(factor):
+            condition, a, b = factor.args
+            product = Select(condition, a * product, b * product)
+    return product
+
+
+def _switches(factor: Expression) -> bool:
+    return isinstance(factor, Step) or (isinstance(factor, Select) and ZERO in factor.args[1:])

@@ -1,0 +1,469 @@
+"""Kinks and jumps of expressions, taken apart: the surfaces where they lie, and the smooth pieces between.
+
+A switching function such as ``sign(u)`` has one surface, where ``u`` vanishes, and one smooth branch on each
+side of it. `resolved` puts the branches in place of the functions, outermost choices first: of
+``where(a < 0, f, g)`` only the branch taken is looked at further.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from hybrid.expression.derivatives import derivative
+from hybrid.expression.graph import all_replaced, contains, is_larger_than, mentions, nodes_of, replaced
+from hybrid.expression.nodes import (
+    ONE,
+    ZERO,
+    Expression,
+    Number,
+    Power,
+    Symbol,
+    base_and_exponent,
+    factors_of,
+    multiply,
+    number,
+    power,
+)
+from hybrid.expression.operations import (
+    Absolute,
+    Ceiling,
+    Cos,
+    Equal,
+    Exp,
+    Floor,
+    Less,
+    LessEqual,
+    Level,
+    Maximum,
+    Minimum,
+    Remainder,
+    Select,
+    Sign,
+    Sin,
+    Step,
+    Truncate,
+    TruncatedRemainder,
+    Truth,
+    WholeQuotient,
+)
+from hybrid.expression.polynomials import coefficients_of, expanded, ratio
+from hybrid.expression.ranges import range_of
+from hybrid.expression.text import text
+from hybrid.expression.tracing import Symbols
+
+COMPARISONS = (Less, LessEqual, Equal)
+COUNTS = (Floor, Ceiling, Truncate, WholeQuotient, Remainder, TruncatedRemainder)
+SWITCHING = (*COMPARISONS, *COUNTS, Sign, Step, Absolute, Maximum, Minimum)
+QUARTER = number(0.25)
+# Surfaces written as longer trees are not expanded, so two of them are the same only if written alike.
+MOST_TERMS = 200
+# Digits to which coefficients of surfaces are compared.
+DIGITS = 12
+# Rounding of these coefficients, as a share of the largest.
+ROUNDING = 1e-12
+
+
+# What a surface that is both ends of a pulse keeps: see ``Surface.pulse``.
+Pulse = tuple[Expression, Expression, int]
+
+
+@attrs.frozen
+class Surface:
+    """A surface ``height = 0``.
+
+    Attributes
+    ----------
+    height
+        Positive above the surface, negative below it.
+    core, level
+        The surface lies where ``core``, a sum without constant that is written down as text, has the value
+        ``level``. Surfaces with the same core are parallel. The height grows with the core.
+    argument
+        For a floor its argument, whose fraction is below 1/2 above the surface; else None.
+    pulse
+        For both ends of a pulse, ``u``, ``d`` and the side on which the fraction of ``u`` exceeds ``d``.
+    """
+
+    height: Expression
+    core: str
+    level: float
+    argument: Expression | None = None
+    pulse: Pulse | None = None
+
+
+class Surfaces:
+    """The surfaces that have been found so far, numbered; a surface that is written twice is one."""
+
+    def __init__(self, symbols: Symbols) -> None:
+        self.symbols = symbols
+        self.known: list[Surface] = []
+        self.pulses: dict[str, Pulse] = {}
+        self._implied: dict[Any, int | None] = {}
+
+    def find(self, height: Expression, argument: Expression | None = None) -> tuple[int, int]:
+        """Number of the surface where an expression vanishes, and 1 if it is positive above, else -1."""
+        core, level, orientation = _core(height, self.symbols)
+        number = self._number(core, level)
+        if number is not None:
+            return number, orientation
+        upwards = height if orientation > 0 else -height
+        self.known.append(Surface(upwards, core, level, argument, self.pulses.get(core)))
+        return len(self.known) - 1, orientation
+
+    def match(self, height: Expression) -> tuple[int, int] | None:
+        """As `find`, but None if the surface has not been found before."""
+        core, level, orientation = _core(height, self.symbols)
+        number = self._number(core, level)
+        return None if number is None else (number, orientation)
+
+    def _number(self, core: str, level: float) -> int | None:
+        for place, surface in enumerate(self.known):
+            close = abs(surface.level - level) <= 10.0**-DIGITS * max(abs(level), abs(surface.level))
+            if surface.core == core and close:
+                return place
+        return None
+
+    def implied(self, number: int, sides: Mapping[int, int]) -> int | None:
+        """The side of a surface that the sides of other surfaces imply; None if they imply none.
+
+        Parameters
+        ----------
+        sides
+            By number of a surface: -1 below, 1 above, 0 on it; -2 and 2 on it, with the branch of that side.
+        """
+        key = number, frozenset((other, side) for other, side in sides.items() if other != number)
+        if key not in self._implied:
+            given = [(self.known[other].height, side) for other, side in key[1]]
+            height = self.known[number].height
+            self._implied[key] = next((side for side in (1, -1) if _follows(height, side, given)), None)
+        return self._implied[key]
+
+
+def _follows(height: Expression, side: int, given: Sequence[tuple[Expression, int]]) -> bool:
+    """Whether a height is proved to have the sign ``side``, as a sum of others (Farkas' lemma).
+
+    It has if it is a positive constant plus a combination of the others, with factors that have the signs of
+    these others; a surface that the state lies on may have any factor. Products of states and parameters
+    count as variables of their own.
+    """
+    target = _monomials(height)
+    columns, strict = [{ONE: 1.0}], [True]
+    for other, on in given:
+        row = _monomials(other)
+        if row is None:
+            continue
+        signs = (1.0, -1.0) if on in (0, -2, 2) else (float(on),)
+        columns += [{name: sign * factor for name, factor in row.items()} for sign in signs]
+        strict += [on in (-1, 1)] * len(signs)
+    if target is None or not target.keys() <= {name for row in columns for name in row}:
+        return False
+    # SciPy's optimisers take half a second to import.
+    from scipy.optimize import nnls
+
+    names = [*{name for row in [*columns, target] for name in row}]
+    matrix = np.array([[row.get(name, 0.0) for row in columns] for name in names])
+    factors, distance = nnls(matrix, np.array([side * target.get(name, 0.0) for name in names]))
+    scale = max(map(abs, target.values()))
+    return bool(distance <= ROUNDING * scale and np.any(factors[strict] > ROUNDING * scale))
+
+
+def _monomials(height: Expression) -> dict[Expression, float] | None:
+    """Coefficients of the products of symbols in a height; None if it is too long to be expanded."""
+    if is_larger_than(MOST_TERMS, height):
+        return None
+    return {name: float(factor) for name, factor in coefficients_of(height).items()}
+
+
+def _core(height: Expression, symbols: Symbols) -> tuple[str, float, int]:
+    """Text of a height without its constant and leading factor, the level, and the sign of the factor."""
+    if is_larger_than(MOST_TERMS, height):
+        return text(height), 0.0, 1
+    coefficients = dict(coefficients_of(height))
+    constant = float(coefficients.pop(ONE, 0))
+    leading = next((float(coefficients[x]) for x in symbols.x if x in coefficients), None)
+    terms = sorted((text(term), float(factor)) for term, factor in coefficients.items())
+    factor = terms[0][1] if leading is None else leading
+    core = " + ".join(f"{each / factor:.{DIGITS}e}*{term}" for term, each in terms)
+    return core, -constant / factor, 1 if factor > 0 else -1
+
+
+@attrs.frozen
+class Resolved:
+    """Expressions without switching functions, and the sides of surfaces that were used, each -1 or 1.
+
+    Attributes
+    ----------
+    bare
+        The expressions without protection of fractional powers, which are nan beyond their surface.
+    """
+
+    entries: tuple[Expression, ...]
+    used: dict[int, int]
+    bare: tuple[Expression, ...]
+
+
+@attrs.define
+class _Stage:
+    """Expressions with some switches decided: the next switch and what it leads to on either side."""
+
+    entries: tuple[Expression, ...]
+    used: dict[int, int]
+    atom: Expression | None = None
+    number: int = -1
+    orientation: int = 0
+    beyond: dict[int, _Stage] = attrs.field(factory=dict)
+    resolved: Resolved | None = None
+
+
+class Switches:
+    """The switching functions in a few expressions; what has been worked out for some sides is kept.
+
+    Parameters
+    ----------
+    entries
+        In the symbols of ``surfaces``.
+    """
+
+    def __init__(self, entries: Sequence[Expression], surfaces: Surfaces) -> None:
+        self.surfaces = surfaces
+        pulses = tuple(_pulses(entry, surfaces) for entry in entries)
+        self._root = self._stage(pulses, {})
+
+    def resolved(self, sides: Mapping[int, int]) -> Resolved | int:
+        """Expressions with the branches on given sides; or the first surface whose side is missing.
+
+        Parameters
+        ----------
+        sides
+            By number of a surface: -1 below, 1 above; -2 and 2 on it, with the branch of that side.
+        """
+        stage = self._root
+        while stage.atom is not None:
+            side = sides.get(stage.number) or self.surfaces.implied(stage.number, sides)
+            if side is None:
+                return stage.number
+            side = 1 if side > 0 else -1
+            if side not in stage.beyond:
+                stage.beyond[side] = self._decided(stage, side)
+            stage = stage.beyond[side]
+        if stage.resolved is None:
+            heights = [self.surfaces.known[number].height for number in stage.used]
+            guarded = tuple(_guarded(entry, heights) for entry in stage.entries)
+            stage.resolved = Resolved(guarded, stage.used, stage.entries)
+        return stage.resolved
+
+    def _decided(self, stage: _Stage, side: int) -> _Stage:
+        assert stage.atom is not None
+        branch = _branch(stage.atom, side * stage.orientation)
+        entries = tuple(all_replaced(stage.entries, {stage.atom: branch}))
+        return self._stage(entries, {**stage.used, stage.number: side})
+
+    def _stage(self, entries: tuple[Expression, ...], used: dict[int, int]) -> _Stage:
+        """The stage that these expressions are in, up to the first switch whose side is not known."""
+        while (atom := _first_atom(entries, self.surfaces.symbols)) is not None:
+            branch = _rewritten(atom, self.surfaces.symbols)
+            if branch is None:
+                height, argument = _height(atom)
+                height, sign = self._simpler(height, used)
+                place, orientation = self.surfaces.find(height, argument)
+                orientation *= sign
+                if place not in used:
+                    entries = tuple(map(_without_truths, entries))
+                    return _Stage(entries, used, atom, place, orientation)
+                branch = _branch(atom, used[place] * orientation)
+            entries = tuple(all_replaced(entries, {atom: branch}))
+        return _Stage(tuple(map(_without_truths, entries)), used)
+
+    def _simpler(self, height: Expression, used: Mapping[int, int]) -> tuple[Expression, int]:
+        """A height without the factors whose signs are known on some sides, and these signs' product."""
+        given = [(self.surfaces.known[number].height, side) for number, side in used.items()]
+        kept, sign = [], 1
+        for factor in factors_of(height):
+            base, exponent = base_and_exponent(factor)
+            whole = isinstance(exponent, Number) and exponent.is_whole
+            even = whole and exponent.value % 2 == 0
+            if even or isinstance(factor, Exp) or _follows(base, 1, given):
+                continue
+            found = range_of(factor)
+            if whole and (found.negative or _follows(base, -1, given)):
+                sign = -sign
+            elif not found.positive:
+                kept.append(factor)
+        return (multiply(*kept), sign) if kept else (height, 1)
+
+
+def switching_names(entries: Sequence[Expression], symbols: Symbols) -> list[str]:
+    """Names of the switching functions of the state or of time in expressions."""
+    found = {type(atom).__name__ for atom in nodes_of(SWITCHING, *entries) if _switches(atom, symbols)}
+    return sorted(found)
+
+
+def _switches(atom: Expression, symbols: Symbols) -> bool:
+    return not isinstance(atom, Level) and mentions(atom, symbols.variables)
+
+
+def _first_atom(entries: Sequence[Expression], symbols: Symbols) -> Expression | None:
+    """An innermost switching function; those in the condition of a choice come before its branches."""
+    clean: set[Expression] = set()
+
+    def search(node: Expression) -> Expression | None:
+        if node in clean or not contains(node, SWITCHING):
+            return None
+        for argument in node.args:
+            found = search(argument)
+            if found is not None:
+                return found
+        if isinstance(node, SWITCHING) and _switches(node, symbols):
+            return node
+        clean.add(node)
+        return None
+
+    for entry in entries:
+        found = search(entry)
+        if found is not None:
+            return found
+    return None
+
+
+def _rewritten(atom: Expression, symbols: Symbols) -> Expression | None:
+    """An atom in terms of simpler ones; None if it is a simple one."""
+    if isinstance(atom, Equal):
+        # It holds on a surface only, not beside it.
+        return ZERO
+    if isinstance(atom, WholeQuotient):
+        a, b = atom.args
+        return Floor(a / b)
+    if isinstance(atom, Remainder):
+        a, b = atom.args
+        return a - b * Floor(a / b)
+    if isinstance(atom, TruncatedRemainder):
+        a, b = atom.args
+        return a - b * Truncate(a / b)
+    if isinstance(atom, Truncate):
+        [u] = atom.args
+        return Select(Less(u, ZERO), Ceiling(u), Floor(u))
+    return _fixed(atom, symbols)
+
+
+def _fixed(atom: Expression, symbols: Symbols) -> Expression | None:
+    """An atom that never switches, although it is written with variables; None if it may switch."""
+    if isinstance(atom, Equal):
+        return None
+    height, argument = _height(atom)
+    height = height if argument is None else argument
+    if is_larger_than(MOST_TERMS, height):
+        return None
+    height = expanded(height)
+    if mentions(height, symbols.variables):
+        return None
+    if isinstance(atom, Maximum | Minimum):
+        a, b = atom.args
+        return Select(Less(ZERO, height), *((a, b) if isinstance(atom, Maximum) else (b, a)))
+    return atom.rebuilt([*([ZERO] if isinstance(atom, Less | LessEqual) else []), height])
+
+
+def _pulses(entry: Expression, surfaces: Surfaces) -> Expression:
+    """An expression whose comparisons of a fraction with a constant have one surface: both ends of a pulse.
+
+    The fraction of ``u``, as in ``mod(t, 4) > 1``, is above ``d`` where ``cos(pi*d) > cos(2*pi*(u - d/2))``.
+    As a function of ``u`` the right side does not jump where the fraction does.
+    """
+    changes = {}
+    for atom in nodes_of((Less, LessEqual, Sign, Step), entry):
+        height = _height(atom)[0]
+        pulse = _pulse(height, surfaces) if contains(height, (Floor, Remainder)) else None
+        if pulse is not None:
+            changes[atom] = atom.rebuilt([*([ZERO] if isinstance(atom, Less | LessEqual) else []), pulse])
+    return replaced(entry, changes) if changes else entry
+
+
+def _pulse(height: Expression, surfaces: Surfaces) -> Expression | None:
+    """A smooth height with the sign of ``g*(u - floor(u)) + c``; None if a height is not of this form."""
+    if is_larger_than(MOST_TERMS, height):
+        return None
+    quotients = {node: a - b * Floor(a / b) for node in nodes_of(Remainder, height) for a, b in [node.args]}
+    height = expanded(replaced(height, quotients))
+    floors = nodes_of(Floor, height)
+    if len(floors) != 1 or contains(height, Level):
+        return None
+    [floor] = floors
+    [u], share = floor.args, Symbol("share")
+    slope = -derivative(replaced(height, {floor: share}), share)
+    if slope is ZERO or contains(u, SWITCHING) or mentions(slope, (share, *surfaces.symbols.variables)):
+        return None
+    constant = expanded(height - slope * (u - floor))
+    level = ratio(-constant, slope) if constant is not ZERO else ZERO
+    if level is None:
+        return None
+    if not 0 < level.value < 1:
+        return slope if level.value <= 0 else -slope
+    middle = number(2.0 * math.pi) * (u - level / 2)
+    pulse = slope * (number(math.cos(math.pi * float(level))) - Cos(middle))
+    if slope.is_number:
+        core, _, orientation = _core(pulse, surfaces.symbols)
+        surfaces.pulses[core] = u, level, orientation if slope.value > 0 else -orientation
+    return pulse
+
+
+def _height(atom: Expression) -> tuple[Expression, Expression | None]:
+    """The expression that vanishes where an atom switches; for a floor also its argument."""
+    if isinstance(atom, Less | LessEqual):
+        a, b = atom.args
+        return b - a, None
+    if isinstance(atom, Maximum | Minimum):
+        a, b = atom.args
+        return a - b, None
+    [u] = atom.args
+    if isinstance(atom, Floor | Ceiling):
+        # Positive in the first half of each step from a whole number to the next, negative in the second.
+        return Sin(number(2.0 * math.pi) * u), u
+    return u, None
+
+
+def _branch(atom: Expression, side: int) -> Expression:
+    """What an atom is where the expression of `_height` has the sign ``side``."""
+    if isinstance(atom, Less | LessEqual | Step):
+        return ONE if side > 0 else ZERO
+    if isinstance(atom, Sign):
+        return number(side)
+    if isinstance(atom, Maximum | Minimum):
+        a, b = atom.args
+        return a if (side > 0) == isinstance(atom, Maximum) else b
+    [u] = atom.args
+    if isinstance(atom, Absolute):
+        return u if side > 0 else -u
+    # The floor has the same value up to a quarter beyond both ends of its half of a step.
+    level = Level(u + QUARTER if side > 0 else u - QUARTER)
+    return level if isinstance(atom, Floor) else level + 1
+
+
+def _without_truths(expression: Expression) -> Expression:
+    """The expression with numbers that serve as conditions taken as true: they are zero on a surface only."""
+    changes = {}
+    for node in nodes_of(Select, expression):
+        condition, a, _ = node.args
+        if not isinstance(condition, Truth) and condition.mask and not contains(condition, SWITCHING):
+            changes[node] = a
+    return replaced(expression, changes) if changes else expression
+
+
+def _guarded(expression: Expression, heights: Sequence[Expression]) -> Expression:
+    """The expression with fractional powers of heights made zero beyond their surface, where they are nan.
+
+    A step may evaluate a point slightly outside of its mode.
+    """
+    changes = {}
+    for node in nodes_of(Power, expression):
+        base, exponent = node.args
+        if exponent.is_number and not exponent.is_whole and _is_multiple(base, heights):
+            changes[node] = power(Maximum(base, ZERO), exponent)
+    return replaced(expression, changes) if changes else expression
+
+
+def _is_multiple(base: Expression, heights: Sequence[Expression]) -> bool:
+    return any(ratio(base, height) is not None for height in heights)

@@ -1,0 +1,76 @@
+"""Expressions as model functions: on numbers, on traced numbers, and in other symbols."""
+
+import numpy as np
+import pytest
+import sympy
+from sympy.core.parameters import distribute
+
+from hybrid.expression.evaluation import expressed, scalar
+from hybrid.expression.expressions import Less, Select
+from hybrid.expression.tracing import model_symbols, trace
+
+SYMBOLS = model_symbols(2, 1)
+(Q, V), (K,), T = SYMBOLS.x, SYMBOLS.p, SYMBOLS.t
+FUNCTIONS = {
+    "arithmetic": lambda t, x, p: x[0] * x[1] - t / p[0] + x[0] ** 3 - x[0] ** 1.5,
+    "exponentials": lambda t, x, p: np.exp(x[1]) + np.log(x[0]) + np.exp2(x[1]) - np.expm1(x[0]),
+    "logarithms": lambda t, x, p: np.log1p(x[0]) + 10 * np.log2(x[0]) + 100 * np.log10(x[0]),
+    "circular": lambda t, x, p: np.sin(x[0]) + np.cos(x[1]) * np.tan(t) + np.arcsin(x[0]),
+    "inverse": lambda t, x, p: np.arccos(x[0]) + 10 * np.arctan(x[1]) + np.arctan2(x[1], x[0]),
+    "hyperbolic": lambda t, x, p: np.sinh(x[0]) + np.cosh(x[1]) * np.tanh(t),
+    "inverse hyperbolic": lambda t, x, p: np.arcsinh(x[1]) + np.arccosh(p[0]) + np.arctanh(x[0]),
+    "roots": lambda t, x, p: np.sqrt(x[0]) + np.cbrt(x[1]) + np.hypot(x[0], x[1]),
+    "kinks": lambda t, x, p: np.abs(x[1]) + 2 * np.maximum(x[0], x[1]) + 4 * np.minimum(x[0], t),
+    "jumps": lambda t, x, p: np.sign(x[1]) + np.heaviside(x[0], 0.5) + np.heaviside(-x[0], 0.5),
+    "rounding": lambda t, x, p: np.floor(x[1]) + 10 * np.ceil(x[1]) + 100 * np.trunc(x[1]),
+    "remainders": lambda t, x, p: np.mod(x[1], 0.4) + 10 * np.fmod(x[1], 0.4),
+    "choices": lambda t, x, p: np.where((x[0] < x[1]) | (x[0] == t), 1.0, np.where(x[1] <= t, 2.0, 3.0)),
+    "connectives": lambda t, x, p: np.where((x[0] > 0) & ~(x[1] > 0), x[0], x[1]),
+    "numbers": lambda t, x, p: np.pi * x[0] + 2.5,
+}
+PLACES = [(0.3, (0.45, -1.3), (1.7,)), (1.1, (0.8, 0.6), (2.5,))]
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_on_numbers_they_are_the_function(name):
+    function = FUNCTIONS[name]
+    expressions = trace(lambda t, x, p: (function(t, x, [p.k]), x[0]), 2, ("k",))
+    both, first = expressed(expressions), scalar(expressions[0])
+    for t, x, p in PLACES:
+        expected = float(function(np.float64(t), np.array(x), np.array(p)))
+        found = both(np.float64(t), np.array(x), np.array(p))
+        assert float(found[0]) == pytest.approx(expected, rel=1e-14)
+        assert found[1] == x[0]
+        assert float(first(np.float64(t), np.array(x), np.array(p))) == float(found[0])
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_tracing_gets_the_expressions_themselves(name):
+    expressions = trace(lambda t, x, p: (FUNCTIONS[name](t, x, [p.k]), x[0]), 2, ("k",))
+    assert trace(expressed(expressions), 2, ("k",)) == expressions
+    assert trace(lambda t, x, p: (scalar(expressions[0])(t, x, p),), 2, ("k",)) == expressions[:1]
+
+
+def test_in_other_symbols_products_stay_products():
+    """``3*(a - b)`` is exact where ``a - b`` is; ``3*a - 3*b`` is not."""
+    with distribute(False):
+        product = 3.0 * (Q - V)
+    [swapped] = trace(lambda t, x, p: expressed([product])(t, [x[1], x[0]], p), 2, ("k",))
+    assert swapped.is_Mul
+    assert swapped == sympy.Mul(3.0, V - Q, evaluate=False)
+
+
+def test_values_that_are_used_twice_are_computed_once():
+    calls = []
+
+    class Counted(np.ndarray):
+        def __array_ufunc__(self, ufunc, method, *inputs, **options):
+            calls.append(ufunc.__name__)
+            plain = [np.asarray(each) if isinstance(each, Counted) else each for each in inputs]
+            return np.asarray(getattr(ufunc, method)(*plain, **options)).view(Counted)
+
+    shared = sympy.sin(Q)
+    function = expressed([shared + 1, shared * 2, Select(Less(Q, V), shared, Q)])
+    place = np.array(0.5).view(Counted)
+    function(0.0, [place, 0.25], [1.0])
+    assert calls.count("sin") == 1

@@ -1,0 +1,215 @@
+import math
+
+import numpy as np
+import pytest
+import sympy
+
+from hybrid.errors import ModelError
+from hybrid.expression.printer import assignments
+from hybrid.expression.tracing import TraceError, model_symbols, trace
+
+NAMES = ("a", "b")
+
+
+def evaluate(expressions, t, x, p):
+    """Values of traced expressions, from the code that would be compiled."""
+    out = np.zeros(len(expressions))
+    lines = assignments([f"out[{i}]" for i in range(len(expressions))], expressions)
+    scope = {"t": t, "x": x, "p": p, "out": out, "np": np, **vars(math)}
+    with np.errstate(all="ignore"):
+        exec("\n".join(lines), scope)
+    return out
+
+
+def traced_scalar(function):
+    return trace(lambda t, x, p: (function(x.a, x.b),), NAMES, ())
+
+
+POSITIVE_UNARY = [
+    *(np.sin, np.cos, np.tan, np.arcsin, np.arccos, np.arctan, np.sinh, np.cosh, np.tanh, np.arcsinh),
+    *(np.arctanh, np.exp, np.exp2, np.expm1, np.log, np.log2, np.log10, np.log1p, np.sqrt, np.cbrt),
+    *(np.square, np.reciprocal, np.absolute, np.fabs, np.sign, np.floor, np.ceil, np.trunc, np.negative),
+    *(np.positive, np.deg2rad, np.rad2deg, np.radians, np.degrees),
+]
+SIGNED_UNARY = [np.abs, np.sign, np.floor, np.ceil, np.trunc, np.cbrt, np.sin, np.exp, np.tanh]
+BINARY = [
+    *(np.add, np.subtract, np.multiply, np.divide, np.floor_divide, np.mod, np.fmod, np.maximum, np.minimum),
+    *(np.fmax, np.fmin, np.hypot, np.arctan2, np.heaviside, np.less, np.less_equal, np.greater),
+    *(np.greater_equal, np.equal, np.not_equal, np.logical_and, np.logical_or),
+]
+
+
+@pytest.mark.parametrize("ufunc", POSITIVE_UNARY, ids=lambda ufunc: ufunc.__name__)
+@pytest.mark.parametrize("a", [0.3, 0.875])
+def test_unary_ufuncs(ufunc, a):
+    expected = ufunc(a)
+    assert evaluate(traced_scalar(lambda u, v: ufunc(u)), 0.0, [a, 0.0], []) == pytest.approx(
+        expected, rel=4e-16
+    )
+
+
+@pytest.mark.parametrize("ufunc", SIGNED_UNARY, ids=lambda ufunc: ufunc.__name__)
+@pytest.mark.parametrize("a", [-2.5, -1.0, 0.0, 1.75, math.nan])
+def test_unary_ufuncs_on_either_side(ufunc, a):
+    result = evaluate(traced_scalar(lambda u, v: ufunc(u)), 0.0, np.array([a, 0.0]), [])
+    np.testing.assert_allclose(result, [ufunc(a)], rtol=4e-16)
+
+
+@pytest.mark.parametrize("ufunc", BINARY, ids=lambda ufunc: ufunc.__name__)
+@pytest.mark.parametrize("x", [(2.5, 0.75), (-2.5, 0.75), (2.5, -0.75), (1.5, 1.5), (0.0, 2.0)])
+def test_binary_ufuncs(ufunc, x):
+    result = evaluate(traced_scalar(ufunc), 0.0, np.array(x), [])
+    np.testing.assert_allclose(result, [float(ufunc(*x))], rtol=4e-16)
+
+
+@pytest.mark.parametrize("ufunc", [np.maximum, np.minimum])
+@pytest.mark.parametrize("x", [(math.nan, 1.0), (1.0, math.nan)])
+def test_extrema_pass_nan_on(ufunc, x):
+    assert np.isnan(evaluate(traced_scalar(ufunc), 0.0, np.array(x), []))
+    assert np.isnan(evaluate(traced_scalar(lambda a, b: ufunc(a, 0) + ufunc(0, b)), 0.0, np.array(x), []))
+
+
+@pytest.mark.parametrize("x", [(2.5, 0.75), (-2.5, 0.75)])
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda a, b: abs(a) ** b,
+        lambda a, b: -(a**3) + 2 / b - a // b + a % b,
+        lambda a, b: (a > 0) * b + (a <= b) * a,
+        lambda a, b: np.where((a > 0) & ~(b > 1), a, 3 * b),
+        lambda a, b: np.where((a > 1) | (b == 0), a**-2, a**7),
+        lambda a, b: np.clip(a, -1, b) + np.clip(a, 0, None),
+        lambda a, b: np.float64(2.0) * a + np.float64(1.0) / b,
+        lambda a, b: abs(b) ** 2.5 + (b * b) ** -1.5,
+        lambda a, b: a / 3 - (a + b) / 7 + 0.1 * b,
+        lambda a, b: np.sum(np.array([[1.0, 2.0], [3.0, 4.0]]) @ np.array([a, b])),
+        lambda a, b: np.sum(np.cos(np.array([a, b]))),
+    ],
+)
+def test_operators_and_choices(function, x):
+    result = evaluate(traced_scalar(function), 0.0, np.array(x), [])
+    np.testing.assert_allclose(result, [function(*map(np.float64, x))], rtol=1e-15)
+
+
+ARRAY = np.array([0.5, -1.5, 2.0, 0.25])
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        lambda t, x, p: np.diff(x),
+        lambda t, x, p: np.concatenate([x[2:], np.cos(x[:2]), [t, 1.0]]),
+        lambda t, x, p: np.maximum(np.diff(np.concatenate([[0.0], x])), 0) ** 1.5,
+        lambda t, x, p: x @ x + np.dot(x[:2], x[2:]) + np.sum(x) + x.sum() + np.prod(x),
+        lambda t, x, p: np.arange(16.0).reshape(4, 4) @ x,
+        lambda t, x, p: np.where(x > 0, x, t * x**2),
+        lambda t, x, p: np.clip(x, -1, 1) + np.cumsum(x),
+        lambda t, x, p: np.max(x) - np.min(x) * p.k,
+        lambda t, x, p: np.outer(x, x),
+        lambda t, x, p: np.array([1.0, 2.0, 3.0, 4.0]) * x[1] + np.roll(x, 1),
+        lambda t, x, p: np.array([x[0], x[1] * p.k]),
+        lambda t, x, p: np.stack([x, p.k * x]),
+        lambda t, x, p: _filled(x),
+    ],
+)
+def test_arrays(function):
+    p = type("P", (), {"k": 3.0})
+    result = evaluate(trace(function, 4, ("k",)), 2.0, ARRAY, [3.0])
+    np.testing.assert_allclose(result, np.ravel(function(2.0, ARRAY, p)), rtol=1e-15)
+
+
+def _filled(x):
+    rate = np.zeros_like(x)
+    rate[:2] = x[2:]
+    rate[2:] += 2 * x[:2]
+    return rate
+
+
+def test_symbols_are_real_and_named_as_code_reads_them():
+    symbols = model_symbols(2, 1)
+    assert [s.name for s in (*symbols.variables, *symbols.p)] == ["x[0]", "x[1]", "t", "p[0]"]
+    assert trace(lambda t, x, p: (p.k * x.a + t, 1), NAMES, ("k",)) == [
+        symbols.p[0] * symbols.x[0] + symbols.t,
+        sympy.Integer(1),
+    ]
+
+
+def test_a_stiff_difference_is_not_multiplied_out():
+    (expression,) = traced_scalar(lambda a, b: 3 * (a - b))
+    x = np.array([1.0 + 2.0**-52, 1.0])
+    assert evaluate([expression], 0.0, x, [])[0] == 3 * 2.0**-52
+
+
+PARITY = [np.sin, np.cos, np.tan, np.arcsin, np.arctan, np.sinh, np.cosh, np.tanh, np.arcsinh, np.arctanh]
+
+
+@pytest.mark.parametrize("ufunc", PARITY, ids=lambda ufunc: ufunc.__name__)
+def test_a_sum_of_negative_terms(ufunc):
+    """SymPy factors out the sign, which must keep every digit, also within a difference."""
+    x = np.array([0.25, 0.125])
+    found = evaluate(traced_scalar(lambda a, b: ufunc(-a - b)), 0.0, x, [])
+    np.testing.assert_allclose(found, [ufunc(-0.375)], rtol=4e-16)
+    near = np.array([1.0 + 2.0**-52, 1.0])
+    found = evaluate(traced_scalar(lambda a, b: ufunc(-(2.0**-60) - 3 * (a - b))), 0.0, near, [])
+    np.testing.assert_allclose(found, [ufunc(-3 * 2.0**-52 - 2.0**-60)], rtol=4e-16)
+
+
+def fails(function, text, state=NAMES):
+    with pytest.raises(TraceError, match=text) as caught:
+        trace(function, state, ())
+    assert isinstance(caught.value, ModelError)
+
+
+def test_what_cannot_be_traced_is_told():
+    fails(
+        lambda t, x, p: (x.a if x.a > 0 else x.b,),
+        r"branch cannot be traced: in place of ``x.a if x.a > 0 else x.b``",
+    )
+    fails(lambda t, x, p: (max(x.a, 0),), r"np.maximum")
+    fails(lambda t, x, p: (math.sin(x.a),), r"use np.sin in place of math.sin")
+    fails(lambda t, x, p: (range(x.a),), "a number is needed")
+    fails(lambda t, x, p: (np.spacing(x.a),), "np.spacing cannot be traced")
+    fails(lambda t, x, p: ("a",), "'a' is not a number")
+    fails(lambda t, x, p: (np.where(x.a > 0),), "np.where needs both values")
+    fails(lambda t, x, p: np.linalg.inv(np.outer(x, x)), "Error", state=2)
+    fails(lambda t, x, p: (x.a / 0,), "not a real number")
+
+
+@pytest.mark.parametrize(
+    "ufunc", [np.sin, np.tan, np.arctan, np.sinh, np.tanh, np.cbrt, np.cos, np.cosh, np.abs]
+)
+@pytest.mark.parametrize(
+    "negative", [lambda a: -a, lambda a: -2.0 * a, lambda a: -a * a * a, lambda a: a * -1]
+)
+def test_a_negative_argument(ufunc, negative):
+    """Odd functions change their sign with that of a product too, even ones do not."""
+    for a in (0.4, -1.3):
+        found = evaluate(traced_scalar(lambda u, v: ufunc(negative(u))), 0.0, np.array([a, 0.0]), [])
+        assert found[0] == pytest.approx(float(ufunc(negative(a))), rel=1e-15)
+
+
+def test_all_symbols_are_real():
+    symbols = model_symbols(2, 3)
+    assert all(each.is_real for each in (symbols.t, *symbols.x, *symbols.p))
+    assert [each.name for each in (*symbols.x, *symbols.p)] == ["x[0]", "x[1]", "p[0]", "p[1]", "p[2]"]
+
+
+@pytest.mark.parametrize("x", [-2.0, 0.25, 3.0])
+def test_piecewise_with_and_without_a_default(x):
+    def with_default(a, b):
+        return np.piecewise(a, [a < 0, a > 1], [lambda z: -z, lambda z: z * z, 7.0])
+
+    def without(a, b):
+        return np.piecewise(a, [a < 0, a > 1], [lambda z: -z, lambda z: z * z])
+
+    for function in (with_default, without):
+        found = evaluate(traced_scalar(function), 0.0, np.array([x, 0.0]), [])
+        assert found[0] == function(np.array([x]), None)[0]
+
+
+def test_a_traced_number_is_real():
+    expressions = trace(
+        lambda t, x, p: (x.a.real, x.b * x.a.imag, x.a.conjugate(), np.imag(x.a) + np.real(x.b)), NAMES, ()
+    )
+    a, b = model_symbols(2, 0).x
+    assert expressions == [a, 0, a, b]
