@@ -12,6 +12,7 @@ import models
 from hybrid.compiler.compiled import emitted_of
 from hybrid.compiler.emit import emit
 from hybrid.expression.continuity import _sides, jumps_of, may_jump, vanishes_on
+from hybrid.expression.nodes import Symbol, number
 from hybrid.expression.tracing import model_symbols, trace
 
 STATES, PARAMETERS = ("q", "v"), ("k", "c")
@@ -161,7 +162,7 @@ def test_exactly_the_surfaces_where_values_jump_are_named(seed):
 
 def sympy_names(surface):
     """``x[0] = 0.5`` for ``0.5 = x[0]`` and for ``x[0] - 0.5 = 0``."""
-    one, other = (sympy.sympify(side.replace("[", "").replace("]", "")) for side in surface.split(" = "))
+    one, other = (number(side.replace("[", "").replace("]", "")) for side in surface.split(" = "))
     [variable] = (one - other).free_symbols
     [level] = sympy.solve(one - other, variable)
     return f"x[{variable.name[1:]}] = {float(level):g}"
@@ -314,11 +315,11 @@ def test_functions_within_a_function_are_looked_at():
 )
 def test_values_below_and_above_a_jump_are_those_of_numpy(function, step, jump, values):
     [expression] = trace(lambda t, x, p: (function(x.q),), STATES, PARAMETERS)
-    symbol = sympy.Symbol("n", integer=True)
+    symbol = Symbol("n", integer=True)
     surface, sides = _sides(expression, symbol)
     [q] = expression.free_symbols
     assert float(surface.subs({q: jump, symbol: step})) == 0.0
-    assert tuple(float(sympy.sympify(side).subs(symbol, step)) for side in sides) == values
+    assert tuple(float(number(side).subs(symbol, step)) for side in sides) == values
     np.testing.assert_allclose([function(jump - 1e-9), function(jump + 1e-9)], values, atol=1e-8)
 
 
@@ -345,4 +346,4 @@ def test_values_below_and_above_a_jump_are_those_of_numpy(function, step, jump, 
 def test_what_vanishes_on_a_surface(expression, surface, vanishes):
     symbols = model_symbols(2, 2)
     names = dict(zip(("q", "v", "k", "c"), (*symbols.x, *symbols.p), strict=True))
-    assert vanishes_on(*(sympy.sympify(each, locals=names) for each in (expression, surface))) == vanishes
+    assert vanishes_on(*(number(each, locals=names) for each in (expression, surface))) == vanishes

@@ -14,9 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybrid import DOP853, HybridSystem, Mode, Taylor, simulate, split
+from hybrid.expression.code import IMPORTS, assignments
 from hybrid.expression.derivatives import jacobian_of
 from hybrid.expression.evaluation import Program
-from hybrid.expression.printer import IMPORTS, assignments
 from hybrid.expression.tracing import model_symbols, trace
 
 NAMES = ("a", "b")

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import sympy
 
-from hybrid.expression.expressions import Less, LessEqual, Select, Step
-from hybrid.expression.nodes import MOST_EXPANDED
+from hybrid.expression.graph import MOST_EXPANDED
+from hybrid.expression.nodes import add, number
+from hybrid.expression.operations import Less, LessEqual, Select, Step
 from hybrid.expression.signs import sign_of, simplified
 from hybrid.expression.tracing import model_symbols, trace
 
@@ -53,7 +54,7 @@ def test_what_no_known_sign_decides_stays(known):
 
 def test_conditions_of_both_kinds():
     for kind in (Less, LessEqual):
-        choice = Select(kind(Q, V), sympy.Integer(2), sympy.Integer(3))
+        choice = Select(kind(Q, V), number(2), number(3))
         assert simplified(choice, [V - Q]) == 2
         assert simplified(choice, [Q - V]) == 3
 
@@ -73,5 +74,5 @@ def test_steps():
 
 
 def test_long_expressions_are_not_expanded():
-    long = sympy.Add(*(V**k for k in range(2, MOST_EXPANDED)))
+    long = add(*(V**k for k in range(2, MOST_EXPANDED)))
     assert sign_of(long, [long]) == 0

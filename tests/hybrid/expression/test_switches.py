@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-import sympy
 
-from hybrid.expression.expressions import Absolute, Less, Level, Select, Sign
-from hybrid.expression.printer import assignments
+from hybrid.expression.code import assignments
+from hybrid.expression.nodes import add
+from hybrid.expression.operations import Absolute, Less, Level, Select, Sign, Sin
 from hybrid.expression.switches import (
     MOST_TERMS,
     Surfaces,
@@ -20,7 +20,7 @@ from hybrid.expression.tracing import model_symbols, trace
 
 SYMBOLS = model_symbols(2, 1)
 (Q, V), (K,), T = SYMBOLS.x, SYMBOLS.p, SYMBOLS.t
-ONE = sympy.Integer(1)
+ONE = number(1)
 
 
 def traced(function):
@@ -133,7 +133,7 @@ class TestSurfaces:
 def test_surfaces_that_are_too_long_to_be_expanded():
     """Two of them are one if they are written alike. Sides imply nothing between them and others."""
     surfaces = Surfaces(SYMBOLS)
-    long = Q * sympy.Add(*(sympy.sin(k * V) for k in range(1, MOST_TERMS)))
+    long = Q * add(*(Sin(k * V) for k in range(1, MOST_TERMS)))
     first, orientation = surfaces.find(long)
     assert (orientation, surfaces.known[first].level, surfaces.known[first].core) == (1, 0.0, str(long))
     assert surfaces.find(long) == (first, 1)
@@ -212,9 +212,9 @@ def test_implied_sides_are_not_asked_for():
     first = switches.resolved({})
     [other] = {0, 1} - {first} if len(surfaces.known) > 1 else {1}
     assert surfaces.known[first].level == 0.0
-    assert switches.resolved({first: -1}).entries == (sympy.Integer(-2),)
+    assert switches.resolved({first: -1}).entries == (number(-2),)
     assert switches.resolved({first: 1}) == other
-    assert switches.resolved({first: 1, other: -1}).entries == (sympy.Integer(0),)
+    assert switches.resolved({first: 1, other: -1}).entries == (number(0),)
 
 
 def test_fractional_powers_of_heights_are_zero_beyond_their_surface():

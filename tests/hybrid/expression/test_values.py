@@ -7,9 +7,9 @@ import warnings
 import numpy as np
 import pytest
 
-from hybrid.expression.printer import assignments
-from hybrid.expression.tracing import TraceError, trace
-from hybrid.expression.values import _content
+from hybrid.expression.code import assignments
+from hybrid.expression.tracing import trace
+from hybrid.expression.values import TraceError, _content
 
 POINTS = [
     np.array([0.75, -0.5, 1.5, 0.25]),
