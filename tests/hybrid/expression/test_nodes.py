@@ -46,8 +46,7 @@ def test_equal_expressions_are_one_object(one, other):
     assert -(a - b) is b - a
     assert a - a is a * 0 is ZERO
     assert a.is_sum or a + a is 2 * a
-    assert a - -b is a + b
-    assert a + ZERO is a * ONE is a / ONE is a**1 is -(-a) is a
+    assert a + ZERO is a * ONE is a / ONE is a**1 is -1 * (-a) is a
 
 
 # Exact numbers, and no signs: those of sums stay within products.
@@ -96,8 +95,10 @@ def test_symbols_that_are_positive_are_others():
 class TestNumbers:
     @pytest.mark.parametrize(
         ("value", "exact"),
-        [(2.0, True), (-0.125, True), (1.5, True), (7, True), (Fraction(1, 3), True), (-0.0, True)]
-        + [(0.1, False), (1 / 16, False), (2.0**50, False), (3**40, False), (Fraction(1, 3**40), False)],
+        [
+            *((2.0, True), (-0.125, True), (1.5, True), (7, True), (Fraction(1, 3), True), (-0.0, True)),
+            *((0.1, False), (1 / 16, False), (2.0**50, False), (3**40, False), (Fraction(1, 3**40), False)),
+        ],
     )  # fmt: skip
     def test_eighths_and_short_fractions_are_exact(self, value, exact):
         made = number(value)
@@ -109,7 +110,7 @@ class TestNumbers:
     def test_infinities_and_nan(self):
         assert number(math.inf) is number(math.inf) is -number(-math.inf)
         assert number(math.nan) is NAN is number(math.inf) - number(math.inf)
-        assert NAN != NAN.value
+        assert NAN.value != NAN
 
     def test_they_compare_as_numbers_do(self):
         assert number(0.5) == HALF == 0.5

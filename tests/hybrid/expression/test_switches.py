@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from hybrid.expression.code import assignments
-from hybrid.expression.nodes import add
+from hybrid.expression.graph import symbols_of
+from hybrid.expression.nodes import Number, add
 from hybrid.expression.operations import Absolute, Less, Level, Select, Sign, Sin
 from hybrid.expression.switches import (
     MOST_TERMS,
@@ -20,7 +21,6 @@ from hybrid.expression.tracing import model_symbols, trace
 
 SYMBOLS = model_symbols(2, 1)
 (Q, V), (K,), T = SYMBOLS.x, SYMBOLS.p, SYMBOLS.t
-ONE = number(1)
 
 
 def traced(function):
@@ -59,7 +59,7 @@ class TestFirst:
     def test_conditions_come_before_what_they_choose(self):
         found = self.first(lambda t, q, v: np.where(q > 1, np.abs(v), 0.0))
         assert found == self.first(lambda t, q, v: np.where(q > 1, v, 0.0))
-        assert found.free_symbols == {Q}
+        assert symbols_of(found) == {Q}
 
 
 class TestSurfaces:
@@ -212,9 +212,9 @@ def test_implied_sides_are_not_asked_for():
     first = switches.resolved({})
     [other] = {0, 1} - {first} if len(surfaces.known) > 1 else {1}
     assert surfaces.known[first].level == 0.0
-    assert switches.resolved({first: -1}).entries == (number(-2),)
+    assert switches.resolved({first: -1}).entries == (Number(-2),)
     assert switches.resolved({first: 1}) == other
-    assert switches.resolved({first: 1, other: -1}).entries == (number(0),)
+    assert switches.resolved({first: 1, other: -1}).entries == (Number(0),)
 
 
 def test_fractional_powers_of_heights_are_zero_beyond_their_surface():
