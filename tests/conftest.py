@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, settings
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
-# SymPy makes many small objects. Fewer searches for garbage among them save 5 % of the processor time.
+# Tracing makes many small objects. Fewer searches for garbage among them save processor time.
 gc.set_threshold(20_000, 20, 20)
 
 # A first example may compile a kernel, so deadlines and slowness checks are switched off.

@@ -70,7 +70,7 @@ KERNEL_ROOMS = tuple(
 DOOR = "hybrid.kernels.types.numba_door"
 INNER_PACKAGES = (("numba", "core"), ("numba", "np"))
 PUBLIC_PARTS = ("numba", "numba.extending", "numba.types", "llvmlite", "llvmlite.binding", "llvmlite.ir")
-HEAVY = ("matplotlib", "networkx", "numba", "pandas", "pint", "scipy", "sympy", "xarray")
+HEAVY = ("matplotlib", "networkx", "numba", "pandas", "pint", "scipy", "xarray")
 MAX_LINES = 500
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from hybrid.compiler.llvm.engine import load
 from hybrid.compiler.llvm.lowering import MATRIX_SIGNATURE, SERIES_SIGNATURE, VECTOR_SIGNATURE, parsed
 from hybrid.compiler.llvm.machine import machine_code
-from hybrid.expression.printer import IMPORTS
+from hybrid.expression.code import IMPORTS
 
 SIGNATURES = (VECTOR_SIGNATURE, MATRIX_SIGNATURE, SERIES_SIGNATURE)
 

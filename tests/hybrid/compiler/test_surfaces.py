@@ -1,11 +1,10 @@
 """Guards that are the same function up to a factor share a surface, and the sign of the factor is known."""
 
-import sympy
-
 import hybrid
 from hybrid.compiler.surfaces import is_paired, surfaces
+from hybrid.expression.nodes import Symbol, number
 
-q, v, e = sympy.symbols("q v e", real=True)
+q, v, e = map(Symbol, ("q", "v", "e"))
 
 
 def test_a_factor_is_divided_out_with_its_sign():
@@ -22,9 +21,7 @@ def test_constants_and_untraced_functions():
     def other():
         """Not traced either."""
 
-    found, signs = surfaces(
-        [one, other, one, one, one], [None, None, None, sympy.Float(2), sympy.Float(2)], {}
-    )
+    found, signs = surfaces([one, other, one, one, one], [None, None, None, number(2), number(2)], {})
     assert found == (0, 1, 0, 2, 3)
     assert signs == (1, 1, 1, 1, 1)
 

@@ -146,7 +146,7 @@ PARITY = [np.sin, np.cos, np.tan, np.arcsin, np.arctan, np.sinh, np.cosh, np.tan
 
 @pytest.mark.parametrize("ufunc", PARITY, ids=lambda ufunc: ufunc.__name__)
 def test_a_sum_of_negative_terms(ufunc):
-    """SymPy factors out the sign, which must keep every digit, also within a difference."""
+    """The sign comes out of the function, which must keep every digit, also within a difference."""
     x = np.array([0.25, 0.125])
     found = evaluate(traced_scalar(lambda a, b: ufunc(-a - b)), 0.0, x, [])
     np.testing.assert_allclose(found, [ufunc(-0.375)], rtol=4e-16)

@@ -145,11 +145,11 @@ def test_a_wrong_derivative_is_found_when_the_system_is_made():
     )
 
 
-def test_making_a_system_imports_neither_sympy_nor_numba():
+def test_making_a_system_does_not_import_numba():
     code = (
         "import sys; from hybrid.system.graph import HybridSystem, Mode\n"
         "HybridSystem(state=1, modes=[Mode('a', lambda t, x, p: -x)])\n"
-        "assert not {'sympy', 'numba'} & set(sys.modules)"
+        "assert 'numba' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
 

@@ -216,7 +216,9 @@ def test_the_modes_of_a_split_system_fit():
     system = swing(lambda t, x, p: -p.g * np.sign(x.v) + spring(t, x, p))
     check_dimensions(hybrid.split(system))
     wrong = hybrid.split(swing(lambda t, x, p: -p.F * np.sign(x.v) + spring(t, x, p)))
-    with pytest.raises(PropertyError, match=r"field of mode 'v<0': N \(p.F\) is added to N / kg"):
+    with pytest.raises(
+        PropertyError, match=r"field of mode 'v<0': N / kg \(x.q, p.m, p.k\) is added to N \(p.F\)"
+    ):
         check_dimensions(wrong)
 
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-import sympy
 from hypothesis import given
 from hypothesis import strategies as st
 
 from hybrid import HybridSystem, Mode, from_equations, simulate
+from hybrid.expression.nodes import HALF, ONE, Number
 from hybrid.transform.additive import sliding_field
 from hybrid.transform.splitter import Splitter
 
@@ -21,12 +21,12 @@ def test_the_shares_solve_the_linear_system(size, seed):
     normals = rng.integers(-3, 4, (size, n))
 
     def vertex_field(sides):
-        return [sympy.Integer(int(middle[i])) + sum(
-            sympy.Integer(int(np.sign(side) * jumps[number, i])) for number, side in sides.items()
+        return [Number(int(middle[i])) + sum(
+            Number(int(np.sign(side) * jumps[number, i])) for number, side in sides.items()
         ) for i in range(n)]  # fmt: skip
 
     matrix = normals @ jumps.T
-    gradients = [[*map(sympy.Integer, map(int, normal)), sympy.Integer(1)] for normal in normals]
+    gradients = [[*map(Number, map(int, normal)), ONE] for normal in normals]
     found = sliding_field(vertex_field, range(size), gradients)
     if abs(np.linalg.det(matrix)) < 0.5:
         assert found is None
@@ -54,9 +54,9 @@ def test_two_switches_of_a_plane_add_up_whatever_the_numbers(seed):
 def test_jumps_that_do_not_add_up_have_no_such_field():
     def vertex_field(sides):
         a, b = (np.sign(side) for side in sides.values())
-        return [sympy.Integer(int(a * b)), sympy.Integer(int(a)), sympy.Integer(int(b))]
+        return [Number(int(a * b)), Number(int(a)), Number(int(b))]
 
-    gradients = [[sympy.Integer(int(i == k)) for i in range(4)] for k in (1, 2)]
+    gradients = [[Number(int(i == k)) for i in range(4)] for k in (1, 2)]
     assert sliding_field(vertex_field, [0, 1], gradients) is None
 
 
@@ -82,9 +82,9 @@ def test_a_field_is_asked_for_on_the_surfaces_with_the_branches_of_their_sides()
 
     def vertex_field(sides):
         asked.append({**sides})
-        a, b = (sympy.Integer(sides[number] // 2) for number in (3, 5))
-        return [sympy.Rational(1, 2) - a, sympy.Rational(1, 4) - b, 4 * a + 8 * b]
+        a, b = (Number(sides[number] // 2) for number in (3, 5))
+        return [HALF - a, HALF / 2 - b, 4 * a + 8 * b]
 
-    gradients = [[sympy.Integer(int(i == k)) for i in range(4)] for k in (0, 1)]
+    gradients = [[Number(int(i == k)) for i in range(4)] for k in (0, 1)]
     assert sliding_field(vertex_field, [3, 5], gradients) == [0, 0, 4]
     assert all(sides.keys() == {3, 5} and {*sides.values()} <= {-2, 2} for sides in asked)

@@ -5,8 +5,8 @@ import pytest
 
 from hybrid import HybridSystem, Mode
 from hybrid.expression.evaluation import Program
-from hybrid.expression.expressions import Level
-from hybrid.expression.nodes import nodes_of
+from hybrid.expression.graph import nodes_of
+from hybrid.expression.operations import Level
 from hybrid.transform.naming import LONGEST
 from hybrid.transform.splitter import Splitter
 

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-import sympy
 
 from hybrid.compiler.bounds.program import programs
-from hybrid.kernels.arithmetic import operations as op
+from hybrid.expression.operations import Exp, Gate
 from hybrid.expression.tracing import model_symbols, trace
+from hybrid.kernels.arithmetic import operations as op
 
 SYMBOLS = model_symbols(2, 1)
 T, Q, V, K = 0.8, 0.45, -1.3, 1.7
@@ -119,13 +119,13 @@ def test_the_last_row_is_the_expression_even_if_it_occurs_inside_of_itself():
 
 def test_what_has_no_program_has_no_rows():
     q = SYMBOLS.x[0]
-    found = programs([None, sympy.gamma(q), q], [], [], SYMBOLS)
+    found = programs([None, Gate(q, q), q], [], [], SYMBOLS)
     assert found.first == (0, 0, 0, 1)
 
 
 def test_rows_of_forcings_that_may_hide_a_pulse_are_checked():
     t, q = SYMBOLS.t, SYMBOLS.x[0]
-    pulse = sympy.exp(-(t**2)) + q
+    pulse = Exp(-(t**2)) + q
     found = programs([pulse], [pulse], [pulse], SYMBOLS)
     marks = [found.checked[found.first[k] : found.first[k + 1]] for k in range(3)]
     assert not any(marks[0])
@@ -150,7 +150,7 @@ def test_rows_of_forcings_that_may_hide_a_pulse_are_checked():
     ],
 )
 def test_powers_with_whole_numbers_that_a_row_can_hold(exponent, code):
-    found = programs([sympy.Pow(SYMBOLS.x[0], sympy.Float(exponent))], [], [], SYMBOLS)
+    found = programs([SYMBOLS.x[0] ** exponent], [], [], SYMBOLS)
     (*_, (own, _, power, _)) = found.rows
     assert own == code
     assert (power if code == op.WHOLE_POWER else found.numbers[power]) == exponent

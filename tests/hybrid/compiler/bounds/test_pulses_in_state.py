@@ -1,18 +1,18 @@
 """Narrow pulses of a field in the state: bumps that a mass passes in a small part of a step."""
 
+from fractions import Fraction
 from functools import cache
 
 import attrs
 import numpy as np
 import pytest
-import sympy
 from scipy.integrate import quad
 
 from hybrid import DOP853, HybridSystem, Mode, RadauIIA, Taylor, Tsit5, simulate
 from hybrid.compiler.bounds.forcing import Forcing, forcings
-from hybrid.kernels.types.codes import ARGUMENTS, TERMS
-from hybrid.expression.expressions import Absolute, Maximum, Minimum
+from hybrid.expression.operations import Absolute, Cosh, Exp, Log, Maximum, Minimum, Several, Sin, Tanh
 from hybrid.expression.tracing import model_symbols
+from hybrid.kernels.types.codes import ARGUMENTS, TERMS
 
 SOLVERS = {"Taylor": Taylor(), "DOP853": DOP853(), "Tsit5": Tsit5(), "RadauIIA": RadauIIA()}
 # Bumps of the height and width one, and their integrals from one side to the other.
@@ -191,18 +191,18 @@ def test_a_field_whose_series_overflows_is_taken_on_by_another_method():
 @pytest.mark.parametrize(
     ("term", "arguments"),
     [
-        (lambda x, y: sympy.exp(-(x**2)) * y, lambda x, y: [-(x**2)]),
-        (lambda x, y: 1 / sympy.cosh(x - 2), lambda x, y: [x - 2]),
-        (lambda x, y: sympy.tanh(x) ** 2, lambda x, y: [Maximum(Minimum(x, sympy.S(20)), -sympy.S(20))]),
-        (lambda x, y: 2 ** (-(x**2)), lambda x, y: [-(x**2) * sympy.log(2)]),
+        (lambda x, y: Exp(-(x**2)) * y, lambda x, y: [-(x**2)]),
+        (lambda x, y: 1 / Cosh(x - 2), lambda x, y: [x - 2]),
+        (lambda x, y: Tanh(x) ** 2, lambda x, y: [Maximum(Minimum(x, 20), -20)]),
+        (lambda x, y: 2 ** (-(x**2)), lambda x, y: [-(x**2) * Log(2)]),
         # Exponentials of affine functions are no pulses.
-        (lambda x, y: sympy.exp(x - y) * sympy.exp(-x), None),
-        (lambda x, y: x**3 * sympy.sin(y), None),
+        (lambda x, y: Exp(x - y) * Exp(-x), None),
+        (lambda x, y: x**3 * Sin(y), None),
         # The tails of gravity show, those of a dipole do not.
-        (lambda x, y: x * (x**2 + y**2) ** sympy.Rational(-3, 2), None),
+        (lambda x, y: x * (x**2 + y**2) ** Fraction(-3, 2), None),
         (
-            lambda x, y: (x**2 + y**2) ** sympy.Rational(-3, 2),
-            lambda x, y: [-sympy.Rational(3, 2) * sympy.log(Absolute(x**2 + y**2))],
+            lambda x, y: (x**2 + y**2) ** Fraction(-3, 2),
+            lambda x, y: [-Fraction(3, 2) * Log(Absolute(x**2 + y**2))],
         ),
     ],
 )
@@ -213,5 +213,5 @@ def test_which_terms_may_be_pulses(term, arguments):
     if arguments is None:
         assert found == []
     else:
-        assert found[0] == Forcing(sympy.Tuple(*arguments(x, y)), -1, ARGUMENTS)
+        assert found[0] == Forcing(Several(*arguments(x, y)), -1, ARGUMENTS)
         assert found[1:] == [Forcing(term(x, y), 1, TERMS)]

@@ -1,18 +1,20 @@
 """Roots of guards that are smooth in time, and clocks of their own for those that are not."""
 
+from fractions import Fraction
+
 import pytest
-import sympy
 
 from hybrid.compiler.propagators.desingularised import desingularised
 from hybrid.compiler.propagators.equations import Boundary, equations_of
 from hybrid.compiler.propagators.rooted import rooted
 from hybrid.compiler.taylor.series import NoSeries
-from hybrid.kernels.types.codes import DESINGULARISED, FROM_LAST_STEP, ROOTED
+from hybrid.expression.nodes import HALF, number
 from hybrid.expression.tracing import model_symbols
+from hybrid.kernels.types.codes import DESINGULARISED, FROM_LAST_STEP, ROOTED
 
 SYMBOLS = model_symbols(2, 1)
 (H, K), [A] = SYMBOLS.x, SYMBOLS.p
-HALF, THIRD, QUARTER = (sympy.Rational(1, n) for n in (2, 3, 4))
+THIRD, QUARTER = (number(Fraction(1, n)) for n in (3, 4))
 # A mode that goes on with the root of its last step says so in these words.
 GOES_ON = f"same = same or origin == {FROM_LAST_STEP}.0"
 
