@@ -42,6 +42,7 @@ from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol, node
 from hybrid.expression.operations import JUMPING
 from hybrid.expression.periodicity import is_periodic
 from hybrid.expression.signs import simplified
+from hybrid.expression.text import text
 from hybrid.expression.tracing import Symbols, TraceError, model_symbols, trace
 from hybrid.kernels.types.codes import WIDE
 from hybrid.system.checks import derivative_has_time_column
@@ -62,9 +63,6 @@ if TYPE_CHECKING:
 Result = TypeVar("Result")
 # A state or a parameter in an expression.
 _INDEXED = re.compile(r"\b[xp]\[\d+\]")
-# Names of functions in expressions, and as they are written in models.
-_WRITTEN = {"Absolute": "abs", "CubeRoot": "cbrt", "Maximum": "maximum", "Minimum": "minimum", "Sign": "sign"}
-_CLASSES = re.compile("|".join(_WRITTEN))
 
 
 def emit(system: HybridSystem) -> Emitted:
@@ -441,14 +439,13 @@ def _where_it_jumps(
 
 def _told(system: HybridSystem, expressions: Sequence[Expression]) -> str:
     """Expressions in the names of the model."""
-    text = ", ".join(_in_names(system, str(each)) for each in expressions)
-    return _CLASSES.sub(lambda match: _WRITTEN[match[0]], text)
+    return ", ".join(_in_names(system, text(each)) for each in expressions)
 
 
-def _in_names(system: HybridSystem, text: str) -> str:
+def _in_names(system: HybridSystem, words: str) -> str:
     names = {f"x[{i}]": name for i, name in enumerate(system.state_names)}
     names |= {f"p[{i}]": name for i, name in enumerate(system.parameters)}
-    return _INDEXED.sub(lambda match: names[match[0]], text)
+    return _INDEXED.sub(lambda match: names[match[0]], words)
 
 
 def _has_proved_period(system: HybridSystem, written: Iterable[Written], writer: _Writer) -> bool:

@@ -13,8 +13,8 @@ from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.taylor.roots import is_multiple
 from hybrid.compiler.written import Written, beyond_guards
 from hybrid.expression.code import assignments
-from hybrid.expression.graph import all_replaced, contains, mentions, nodes_of, replaced
-from hybrid.expression.nodes import ONE, ZERO, Expression, Power, is_whole, order_of
+from hybrid.expression.graph import all_replaced, contains, is_whole, mentions, nodes_of, replaced
+from hybrid.expression.nodes import ONE, ZERO, Expression, Power, Symbol, order_of
 from hybrid.expression.operations import (
     Absolute,
     CubeRoot,
@@ -118,7 +118,7 @@ def fields_at_crossings(
 def _zeros(
     steep: Sequence[Expression],
     guard: Expression,
-    moved: Mapping[Expression, Expression],
+    moved: Mapping[Symbol, Expression],
     known: Sequence[Expression],
     symbols: Symbols,
 ) -> dict[Expression, Expression]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
-from hybrid.expression.graph import is_larger_than
-from hybrid.expression.nodes import Expression, order_of, split, terms_of
+from hybrid.expression.graph import is_larger_than, terms_of
+from hybrid.expression.nodes import Expression, order_of, split
 from hybrid.expression.polynomials import coefficients_of
 
 if TYPE_CHECKING:

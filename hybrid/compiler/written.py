@@ -10,8 +10,8 @@ from hybrid.compiler.jacobians import CELL
 from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.taylor.roots import is_multiple
 from hybrid.expression.code import assignments
-from hybrid.expression.graph import all_replaced, mentions, nodes_of
-from hybrid.expression.nodes import ZERO, Expression, Power, is_negative, is_positive, is_whole, power
+from hybrid.expression.graph import all_replaced, is_negative, is_positive, is_whole, mentions, nodes_of
+from hybrid.expression.nodes import ZERO, Expression, Power, power
 from hybrid.expression.operations import CubeRoot, Less, Maximum, Select
 from hybrid.expression.polynomials import ratio
 from hybrid.expression.signs import simplified

@@ -18,6 +18,8 @@ from hybrid.expression.derivatives import derivative
 from hybrid.expression.graph import (
     MOST_EXPANDED,
     contains,
+    factors_of,
+    in_order,
     is_larger_than,
     mentions,
     nodes,
@@ -25,20 +27,9 @@ from hybrid.expression.graph import (
     once,
     replaced,
     symbols_of,
-)
-from hybrid.expression.nodes import (
-    ONE,
-    ZERO,
-    Expression,
-    Symbol,
-    factors_of,
-    in_order,
-    multiply,
-    number,
-    order_of,
-    split,
     terms_of,
 )
+from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol, multiply, number, order_of, split
 from hybrid.expression.operations import (
     And,
     Atan2,
@@ -67,6 +58,7 @@ from hybrid.expression.operations import (
 )
 from hybrid.expression.polynomials import coefficients_of, expanded, ratio
 from hybrid.expression.ranges import has_one_sign, range_of
+from hybrid.expression.text import text
 
 # Functions that change by their derivatives, other than sums, products and positive powers.
 GRADUAL = (Sin, Cos, Exp, Sinh, Cosh, Log)
@@ -220,7 +212,7 @@ def _substituted(expression: Expression, old: Expression, new: Expression) -> Ex
     return found[expression]
 
 
-def _of_turns(function: type[Expression], angle: Expression) -> Expression:
+def _of_turns(function: type[Sin | Cos | Tan], angle: Expression) -> Expression:
     """A harmonic without whole numbers of turns, exact where the angle is a simple part of a turn."""
     count = coefficients_of(angle).get(STEP, 0) / math.pi
     half_turns = round(count)
@@ -294,15 +286,14 @@ def _is_zero(expression: Expression) -> bool:
 
 
 def _told(atom: Expression) -> str:
+    first, *rest = map(text, atom.args)
     if isinstance(atom, ROUNDING):
-        return f"{atom.args[0]} is a whole number"
+        return f"{first} is a whole number"
     if isinstance(atom, REMAINDERS):
-        return f"{atom.args[0]} is a multiple of {atom.args[1]}"
+        return f"{first} is a multiple of {rest[0]}"
     if isinstance(atom, Atan2):
-        return f"the angle of ({atom.args[1]}, {atom.args[0]}) turns from pi to -pi"
-    if isinstance(atom, Less | LessEqual):
-        return f"{atom.args[1]} = {atom.args[0]}"
-    return f"{atom.args[0]} = 0"
+        return f"the angle of ({rest[0]}, {first}) turns from pi to -pi"
+    return f"{rest[0]} = {first}" if isinstance(atom, Less | LessEqual) else f"{first} = 0"
 
 
 # Functions with jumps that compiled code may call.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from hybrid.expression.graph import contains, once
+from hybrid.expression.graph import contains, in_order, once
 from hybrid.expression.nodes import (
     HALF,
     MINUS_ONE,
@@ -16,7 +16,6 @@ from hybrid.expression.nodes import (
     Expression,
     Symbol,
     add,
-    in_order,
     multiply,
     number,
     power,
@@ -50,7 +49,9 @@ def jacobian_of(expressions: Iterable[Expression], variables: Iterable[Symbol]) 
     and so has the length ``np.hypot`` at the origin. Piecewise constant functions have slope zero.
     """
     rows = partial_derivatives(expressions, list(variables))
-    return [[entry if entry is ZERO else close_gates(defined_at_origin(entry)) for entry in row] for row in rows]
+    return [
+        [entry if entry is ZERO else close_gates(defined_at_origin(entry)) for entry in row] for row in rows
+    ]
 
 
 def partial_derivatives(
@@ -116,7 +117,9 @@ def _slopes(node: Expression, moving: Mapping[Expression, object]) -> Terms:
         return [(each, ONE) for each in args if moving[each]]
     if node.is_product:
         return [
-            (each, multiply(*args[:place], *args[place + 1 :])) for place, each in enumerate(args) if moving[each]
+            (each, multiply(*args[:place], *args[place + 1 :]))
+            for place, each in enumerate(args)
+            if moving[each]
         ]
     return [(each, _slope(node, place)) for place, each in enumerate(args) if moving[each]]
 

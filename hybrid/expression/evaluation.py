@@ -8,8 +8,8 @@ from typing import Any
 
 import attrs
 
-from hybrid.expression.graph import all_replaced
-from hybrid.expression.nodes import Expression, Power, Product, Sum, Symbol, in_order, listed, listing
+from hybrid.expression.graph import all_replaced, in_order, listed, listing
+from hybrid.expression.nodes import Expression, Power, Product, Sum, Symbol
 from hybrid.expression.tracing import Traced, model_symbols
 
 ARITHMETIC: dict[type[Expression], Callable[..., Any]] = {
@@ -51,9 +51,7 @@ class Expressed:
             results = self._program.run(dict(zip(known, values, strict=True)))
         return results if self.size is not None else results[0]
 
-    def _in_terms_of(
-        self, symbols: Sequence[Symbol], contents: Sequence[Expression]
-    ) -> Sequence[Expression]:
+    def _in_terms_of(self, symbols: Sequence[Symbol], contents: Sequence[Expression]) -> Sequence[Expression]:
         changed = {old: new for old, new in zip(symbols, contents, strict=True) if new is not old}
         return all_replaced(self.expressions, changed) if changed else self.expressions
 
@@ -85,7 +83,7 @@ class Program:
             elif isinstance(node, Symbol):
                 self.symbols[place] = node
             else:
-                function = ARITHMETIC.get(type(node)) or type(node).numpy
+                function = ARITHMETIC.get(type(node)) or node.numpy
                 self.calls.append((place, function, tuple(places[each] for each in node.args)))
         self.results = [places[each] for each in expressions]
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, TypeVar
 
-from hybrid.expression.nodes import COUNTLESS, Expression, Function, Symbol, in_order
+from hybrid.expression.nodes import COUNTLESS, ONE, Expression, Function, Number, Symbol
 
 Cached = TypeVar("Cached", bound=Callable[..., Any])
 # Products of tangled sums are not expanded beyond this size: the time may grow with the square of it.
@@ -26,6 +26,71 @@ def forget() -> None:
     """Clear the caches, after a model has been compiled."""
     for function in _remembered:
         function.cache_clear()
+
+
+def terms_of(expression: Expression) -> tuple[Expression, ...]:
+    """The terms of a sum; an expression that is none is one term."""
+    return expression.args if expression.is_sum else (expression,)
+
+
+def factors_of(expression: Expression) -> tuple[Expression, ...]:
+    """The factors of a product; an expression that is none is one factor."""
+    return expression.args if expression.is_product else (expression,)
+
+
+def base_and_exponent(factor: Expression) -> tuple[Expression, Expression]:
+    """What a factor is a power of, and which."""
+    return factor.args if factor.is_power else (factor, ONE)  # type: ignore[return-value]
+
+
+def is_whole(expression: Expression) -> bool:
+    """Whether an expression is a whole number."""
+    return isinstance(expression, Number) and expression.is_whole
+
+
+def is_positive(expression: Expression) -> bool:
+    """Whether an expression is a number above zero."""
+    return isinstance(expression, Number) and expression.value > 0
+
+
+def is_negative(expression: Expression) -> bool:
+    """Whether an expression is a number below zero."""
+    return isinstance(expression, Number) and expression.value < 0
+
+
+def in_order(expressions: Iterable[Expression]) -> list[Expression]:
+    """Every node of the expressions once, each behind the nodes that it is computed from."""
+    found: dict[Expression, None] = {}
+    waiting: list[Any] = [*reversed([*expressions])]
+    while waiting:
+        each = waiting.pop()
+        if type(each) is tuple:
+            found[each[0]] = None
+        elif each not in found:
+            if each.args:
+                waiting.append((each,))
+                waiting += [part for part in reversed(each.args) if part not in found]
+            else:
+                found[each] = None
+    return [*found]
+
+
+def listing(expressions: Sequence[Expression]) -> tuple[list[Any], list[int]]:
+    """Expressions as a list of operations, each on the results of others before it, and their places."""
+    places: dict[Expression, int] = {}
+    rows: list[Any] = []
+    for each in in_order(expressions):
+        places[each] = len(rows)
+        rows.append((type(each), [places[part] for part in each.args]) if each.args else each)
+    return rows, [places[each] for each in expressions]
+
+
+def listed(rows: Sequence[Any], places: Sequence[int]) -> tuple[Expression, ...]:
+    """The expressions of a ``listing``."""
+    found: list[Expression] = []
+    for row in rows:
+        found.append(row if isinstance(row, Expression) else row[0](*(found[place] for place in row[1])))
+    return tuple(found[place] for place in places)
 
 
 def nodes(*expressions: Expression) -> Iterator[Expression]:
@@ -112,11 +177,23 @@ def replaced(expression: Expression, values: Mapping[Any, Expression]) -> Expres
 def all_replaced(expressions: Iterable[Expression], values: Mapping[Any, Expression]) -> list[Expression]:
     """Expressions with some of their nodes replaced; what they share is replaced once."""
     known: dict[Expression, Expression] = dict(values)
+    # A node that holds another has all of its symbols, and all of its functions.
+    masks, traits = {key.mask for key in known}, {key.traits for key in known}
+    mask, trait = (each.pop() if len(each) == 1 else 0 for each in (masks, traits))
     expressions = [*expressions]
-    for node in in_order(expressions):
+    waiting = expressions[::-1]
+    while waiting:
+        node = waiting[-1]
         if node in known:
-            continue
-        args = [known[each] for each in node.args]
-        same = all(new is old for new, old in zip(args, node.args, strict=True))
-        known[node] = node if same else node.rebuilt(args)
+            waiting.pop()
+        elif not node.args or mask & ~node.mask or trait & ~node.traits:
+            known[node] = waiting.pop()
+        else:
+            missing = [each for each in node.args if each not in known]
+            if missing:
+                waiting += missing
+            else:
+                args = [known[each] for each in node.args]
+                same = all(new is old for new, old in zip(args, node.args, strict=True))
+                known[waiting.pop()] = node if same else node.rebuilt(args)
     return [known[each] for each in expressions]

@@ -3,27 +3,27 @@
 A node is a number, a symbol, a sum, a product, a power, or a function of other nodes. Nodes never change. A
 value that a function uses twice is one node with two uses, and two functions that compute the same share it.
 
-Arithmetic is simplified as it is written down, locally and in time that grows with the number of terms: numbers
-are added up, equal terms and factors are collected. Nothing is expanded: ``3*(a - b)`` does not become
-``3*a - 3*b``, which rounds where ``a - b`` is exact. Only a factor -1 goes into a sum, where it changes no
-rounding.
+Arithmetic is simplified as it is written down, locally and in time that grows with the number of terms:
+numbers are added up, equal terms and factors are collected. Nothing is expanded: ``3*(a - b)`` does not
+become ``3*a - 3*b``, which rounds where ``a - b`` is exact. Only a factor -1 goes into a sum, where it changes
+no rounding.
 """
+
+# ruff: noqa: D102 - methods that override others are explained there
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
 from threading import Lock
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 from weakref import WeakValueDictionary
 from zlib import crc32
 
-# An exact number has at most this many binary digits above and below the fraction bar; it is a float beyond.
-EXACT_DIGITS = 53
-# Numbers are told to be exact by floats up to this size: whole numbers of eighths.
-LARGEST_EXACT = 2.0**50
+from hybrid.expression.exact import digits, exact, raised
+
 # A higher power of a product is not split into powers of its factors, which may leave the floating range.
 HIGHEST_SPLIT = 16
 # A number that is taken out of a power has at most this many binary digits, for the same reason.
@@ -84,10 +84,34 @@ class Expression:
     is_sum: ClassVar[bool] = False
     is_product: ClassVar[bool] = False
     is_power: ClassVar[bool] = False
+    is_exponential: ClassVar[bool] = False
     own_traits: ClassVar[int] = 0
 
-    def _begin(self, *args: Expression) -> None:
-        mask, traits, size, first, word = 0, self.own_traits, max(1, len(args) - 1), LAST, crc32(self.name())
+    if TYPE_CHECKING:
+        # What numbers, symbols, powers and functions have alone: ``is_number`` and its like tell which it is.
+        value: Any
+        label: Any
+        positive: bool
+        base: Any
+        exponent: Any
+        numpy: ClassVar[Any]
+        code: ClassVar[Any]
+        word: ClassVar[Any]
+        bounds: ClassVar[Any]
+        range: ClassVar[Any]
+        in_other_terms: ClassVar[Any]
+
+        def slope(self, place: int = 0) -> Any: ...
+        def __float__(self) -> float: ...
+
+    def _begin(self, *args: Any) -> None:
+        mask, traits, size, first, word = (
+            0,
+            self.own_traits,
+            max(1, len(args) - 1),
+            LAST,
+            crc32(type(self).__name__.encode()),
+        )
         for each in args:
             mask |= each.mask
             traits |= each.traits
@@ -98,11 +122,6 @@ class Expression:
         self.args, self.mask, self.traits = args, mask, traits
         self.size = min(size, COUNTLESS)
         self.order = first, self.size, word
-
-    @classmethod
-    def name(cls) -> bytes:
-        """Name of the kind of node."""
-        return cls.__name__.encode()
 
     def rebuilt(self, args: Sequence[Expression]) -> Expression:
         """The same operation on other nodes."""
@@ -159,12 +178,10 @@ class Expression:
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _first_of, (listing([self]),)
+        return type(self), self.args
 
     def __repr__(self) -> str:
-        from hybrid.expression.text import text
-
-        return text(self)
+        return f"{type(self).__name__}({', '.join(map(repr, self.args))})"
 
 
 class Number(Expression):
@@ -172,31 +189,23 @@ class Number(Expression):
 
     __slots__ = ("value",)
 
-    value: int | Fraction | float
     is_number = True
 
-    def __new__(cls, value: Any) -> Number:
-        if isinstance(value, float):
-            if value != value:
-                return _kept(Number, float, "nan")
-            if abs(value) < LARGEST_EXACT and (8.0 * value).is_integer():
-                value = Fraction(value)
-        if isinstance(value, Fraction):
-            if value.denominator == 1:
-                value = value.numerator
-            elif max(abs(value.numerator), value.denominator).bit_length() > EXACT_DIGITS:
-                return Number(float(value)) if float(value) != value else _kept(Number, float, float(value))
-        if isinstance(value, int) and abs(value).bit_length() > EXACT_DIGITS:
-            value = float(value)
-        return _kept(Number, type(value), value)
+    def __new__(cls, value: Any) -> Any:
+        value = exact(value)
+        return _kept(Number, type(value), value if value == value else "nan")
 
-    def _begin(self, kind: type, value: Any) -> None:
+    def _begin(self, *args: Any) -> None:
+        kind, value = args
         self.value = kind(value)
         self.args, self.mask, self.traits, self.size = (), 0, 0, 0
         self.order = LAST, 0, crc32(float(self.value).hex().encode())
 
     def __float__(self) -> float:
         return float(self.value)
+
+    def __repr__(self) -> str:
+        return str(self.value)
 
     @property
     def is_exact(self) -> bool:
@@ -222,27 +231,25 @@ class Symbol(Expression):
 
     __slots__ = ("label", "positive")
 
-    label: str
-    positive: bool
     is_symbol = True
     # Every symbol that there has been, by its bit: names are few.
     known: ClassVar[list[Symbol]] = []
 
-    def __new__(cls, label: str, positive: bool = False) -> Symbol:
+    def __new__(cls, label: str, positive: bool = False) -> Any:
         return _kept(Symbol, label, positive)
 
-    def _begin(self, label: str, positive: bool) -> None:
-        self.label, self.positive = label, positive
+    def _begin(self, *args: Any) -> None:
+        self.label, self.positive = label, _ = args
         self.args, self.traits, self.size = (), 0, 0
         self.mask = 1 << len(Symbol.known)
         Symbol.known.append(self)
         self.order = _place(label), 0, crc32(label.encode())
 
-    def raised(self, exponent: Number) -> Expression | None:
-        return None
-
     def __reduce__(self) -> tuple[Any, ...]:
         return Symbol, (self.label, self.positive)
+
+    def __repr__(self) -> str:
+        return self.label
 
 
 def _place(label: str) -> int:
@@ -261,7 +268,7 @@ class Sum(Expression):
     __slots__ = ()
     is_sum = True
 
-    def __new__(cls, *terms: Expression) -> Expression:
+    def __new__(cls, *terms: Expression) -> Any:
         return add(*terms)
 
     @property
@@ -275,7 +282,7 @@ class Product(Expression):
     __slots__ = ()
     is_product = True
 
-    def __new__(cls, *factors: Expression) -> Expression:
+    def __new__(cls, *factors: Expression) -> Any:
         return multiply(*factors)
 
     @property
@@ -285,7 +292,7 @@ class Product(Expression):
     def raised(self, exponent: Number) -> Expression | None:
         """Its factors raised one by one if the power is whole; else what is not negative, by itself."""
         size, numbers = abs(float(exponent.value)), [each for each in self.args if each.is_number]
-        if size > HIGHEST_SPLIT or any(_digits(each) * size > MOST_DIGITS for each in numbers):
+        if size > HIGHEST_SPLIT or any(digits(each.value) * size > MOST_DIGITS for each in numbers):
             return None
         if exponent.is_whole:
             return multiply(*(power(each, exponent) for each in self.args))
@@ -301,30 +308,22 @@ class Product(Expression):
 class Power(Expression):
     """A power ``base**exponent``."""
 
-    __slots__ = ()
+    __slots__ = ("base", "exponent")
     is_power = True
 
-    def __new__(cls, base: Expression, exponent: Expression) -> Expression:
+    def __new__(cls, base: Expression, exponent: Expression) -> Any:
         return power(base, exponent)
 
-    @property
-    def base(self) -> Expression:
-        """What is raised."""
-        return self.args[0]
-
-    @property
-    def exponent(self) -> Expression:
-        """To which power."""
-        return self.args[1]
+    def _begin(self, *args: Any) -> None:
+        super()._begin(*args)
+        self.base, self.exponent = args
 
     def raised(self, exponent: Number) -> Expression | None:
-        base, inner = self.args
+        base, inner = self.base, self.exponent
         if exponent.is_whole or (base.is_symbol and base.positive):
             return power(base, multiply(inner, exponent))
         if _is_even_power(self):
-            from hybrid.expression.operations import Absolute
-
-            return power(Absolute(base), multiply(inner, exponent))
+            return power(Function.known["Absolute"](base), multiply(inner, exponent))
         return None
 
 
@@ -332,16 +331,19 @@ class Function(Expression):
     """A function of other nodes; ``hybrid.expression.operations`` has them all, with their rules."""
 
     __slots__ = ()
-    count: ClassVar[int] = 0
+    known: ClassVar[dict[str, Any]] = {}
+    # The bit of the class in the traits of nodes.
+    own_trait: ClassVar[int] = 0
+    word: ClassVar[str] = ""
 
     def __init_subclass__(cls) -> None:
-        cls.own_traits = cls.own_traits | 1 << Function.count
-        cls.own_trait = 1 << Function.count
-        Function.count += 1
+        cls.own_trait = 1 << len(Function.known)
+        cls.own_traits |= cls.own_trait
+        Function.known[cls.__name__] = cls
+        if "word" not in vars(cls):
+            cls.word = cls.__name__.lower()
 
-    own_trait: ClassVar[int] = 0
-
-    def __new__(cls, *args: Any) -> Expression:
+    def __new__(cls, *args: Any) -> Any:
         parts = tuple(map(node, args))
         made = cls.simplified(*parts)
         return _kept(cls, *parts) if made is None else made
@@ -359,7 +361,9 @@ def node(value: Any) -> Expression:
 
 def number(value: Any) -> Number:
     """A number as a node of the same value; exact for whole numbers, eighths and fractions."""
-    return Number(value if isinstance(value, int | Fraction) and not isinstance(value, bool) else float(value))
+    return Number(
+        value if isinstance(value, int | Fraction) and not isinstance(value, bool) else float(value)
+    )
 
 
 def add(*terms: Expression) -> Expression:
@@ -419,13 +423,18 @@ def _negative(total: Expression) -> Expression:
 
 
 def multiply(*factors: Expression) -> Expression:
-    """The product of factors, with the powers of equal bases collected."""
+    """The product of factors, with the powers of equal bases collected, and those of e."""
     coefficient: Any = 1
     found: dict[Expression, Any] = {}
+    exponential: Expression | None = None
     for factor in factors:
         for each in factor.args if factor.is_product else (factor,):
             if each.is_number:
                 coefficient = coefficient * each.value
+            elif each.is_exponential:
+                exponential = (
+                    each if exponential is None else each.rebuilt([exponential.args[0] + each.args[0]])
+                )
             else:
                 base, exponent = each, 1
                 if each.is_power and each.exponent.is_number:
@@ -434,6 +443,8 @@ def multiply(*factors: Expression) -> Expression:
     if coefficient == 0:
         return ZERO
     parts = [base if e == 1 else power(base, Number(e)) for base, e in found.items() if e != 0]
+    if exponential is not None:
+        parts.append(exponential)
     if any(part.is_product or part.is_number for part in parts):
         return multiply(Number(coefficient), *parts)
     leading = Number(coefficient)
@@ -452,114 +463,21 @@ def power(base: Expression, exponent: Expression) -> Expression:
     if exponent is ZERO or exponent is ONE:
         return base if exponent is ONE else ONE
     if base.is_number:
-        return Number(_raised(base.value, exponent.value))
+        return Number(raised(base.value, exponent.value))
+    assert isinstance(exponent, Number)
     made = base.raised(exponent)
     return _kept(Power, base, exponent) if made is None else made
 
 
 def _power_of_zero(exponent: Expression) -> Expression:
-    from hybrid.expression.operations import Equal, Less, Select
-
-    return Select(Less(ZERO, exponent), ZERO, Select(Equal(exponent, ZERO), ONE, Number(math.inf)))
-
-
-def _raised(base: Any, exponent: Any) -> Any:
-    """A power of numbers: exact if both are and it is short; nan if it is no real number."""
-    if isinstance(exponent, int) and not isinstance(base, float) and base != 0:
-        if _digits(Number(base)) * abs(exponent) <= EXACT_DIGITS:
-            return Fraction(base) ** exponent
-    try:
-        value = float(base) ** float(exponent)
-    except ZeroDivisionError:
-        return math.nan
-    except OverflowError:
-        return math.inf
-    return math.nan if isinstance(value, complex) else value
-
-
-def _digits(value: Expression) -> float:
-    """Binary digits of an exact number above or below the fraction bar, or the floating exponent of another."""
-    number = value.value
-    if isinstance(number, float):
-        size = abs(number)
-        return abs(math.log2(size)) if 0.0 < size < math.inf else math.inf
-    fraction = Fraction(number)
-    return math.log2(max(abs(fraction.numerator), fraction.denominator))
+    select, less, equal = (Function.known[name] for name in ("Select", "Less", "Equal"))
+    return select(less(ZERO, exponent), ZERO, select(equal(exponent, ZERO), ONE, Number(math.inf)))
 
 
 def _is_even_power(expression: Expression) -> bool:
     if not expression.is_power or not expression.exponent.is_number:
         return False
     return expression.exponent.is_whole and expression.exponent.value % 2 == 0
-
-
-def terms_of(expression: Expression) -> tuple[Expression, ...]:
-    """The terms of a sum; an expression that is none is one term."""
-    return expression.args if expression.is_sum else (expression,)
-
-
-def factors_of(expression: Expression) -> tuple[Expression, ...]:
-    """The factors of a product; an expression that is none is one factor."""
-    return expression.args if expression.is_product else (expression,)
-
-
-def base_and_exponent(factor: Expression) -> tuple[Expression, Expression]:
-    """What a factor is a power of, and which."""
-    return factor.args if factor.is_power else (factor, ONE)  # type: ignore[return-value]
-
-
-def is_whole(expression: Expression) -> bool:
-    """Whether an expression is a whole number."""
-    return isinstance(expression, Number) and expression.is_whole
-
-
-def is_positive(expression: Expression) -> bool:
-    """Whether an expression is a number above zero."""
-    return isinstance(expression, Number) and expression.value > 0
-
-
-def is_negative(expression: Expression) -> bool:
-    """Whether an expression is a number below zero."""
-    return isinstance(expression, Number) and expression.value < 0
-
-
-def in_order(expressions: Iterable[Expression]) -> list[Expression]:
-    """Every node of the expressions once, each behind the nodes that it is computed from."""
-    found: dict[Expression, None] = {}
-    waiting: list[Any] = [*reversed([*expressions])]
-    while waiting:
-        each = waiting.pop()
-        if type(each) is tuple:
-            found[each[0]] = None
-        elif each not in found:
-            if each.args:
-                waiting.append((each,))
-                waiting += [part for part in reversed(each.args) if part not in found]
-            else:
-                found[each] = None
-    return [*found]
-
-
-def listing(expressions: Sequence[Expression]) -> tuple[list[Any], list[int]]:
-    """Expressions as a list of operations, each on the results of others before it, and their places."""
-    places: dict[Expression, int] = {}
-    rows: list[Any] = []
-    for each in in_order(expressions):
-        places[each] = len(rows)
-        rows.append((type(each), [places[part] for part in each.args]) if each.args else each)
-    return rows, [places[each] for each in expressions]
-
-
-def listed(rows: Sequence[Any], places: Sequence[int]) -> tuple[Expression, ...]:
-    """The expressions of a ``listing``."""
-    found: list[Expression] = []
-    for row in rows:
-        found.append(row if isinstance(row, Expression) else row[0](*(found[place] for place in row[1])))
-    return tuple(found[place] for place in places)
-
-
-def _first_of(rows_and_places: tuple[list[Any], list[int]]) -> Expression:
-    return listed(*rows_and_places)[0]
 
 
 ZERO, ONE, MINUS_ONE, TWO, HALF = (Number(each) for each in (0, 1, -1, 2, Fraction(1, 2)))

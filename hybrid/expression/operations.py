@@ -1,9 +1,11 @@
 """The functions that expressions are made of, each with all that is known of it: one class per function.
 
-``on_floats`` is its value, ``numpy`` the same on arrays, ``code`` its name in generated code, ``bounds`` its
-number in interval programs. ``slope(i)`` is its derivative in an argument, ``range`` holds its values, and
-``parity`` says whether it is even (1) or odd (-1). ``in_other_terms`` expresses it by functions with series.
+``numpy`` is its value, ``code`` its name in generated code, ``word`` that in texts, ``bounds`` its number in
+interval programs. ``slopes`` are its derivatives in its arguments, ``range`` holds its values, and ``parity``
+says whether it is even (1) or odd (-1). ``in_other_terms`` expresses it by functions with series.
 """
+
+# ruff: noqa: D102 - methods that override others are explained there
 
 from __future__ import annotations
 
@@ -15,7 +17,6 @@ import numpy as np
 
 from hybrid.expression.nodes import (
     HALF,
-    NAN,
     ONE,
     TWO,
     ZERO,
@@ -44,13 +45,13 @@ class RealFunction(Function):
     """A function of real numbers; numbers are put in, a sign comes out where it may."""
 
     __slots__ = ()
-    on_floats: ClassVar[Callable[..., float]]
-    numpy: ClassVar[Callable[..., Any]]
-    code: ClassVar[str] = ""
-    bounds: ClassVar[int] = 0
+    numpy: ClassVar[Any]
+    code: ClassVar[Any] = ""
+    bounds: ClassVar[Any] = 0
     parity: ClassVar[int] = 0
     range: ClassVar[Any] = staticmethod(lambda *parts: ANYTHING)
-    in_other_terms: ClassVar[Callable[..., Expression] | None] = None
+    slopes: ClassVar[tuple[Callable[..., Expression], ...]] = ()
+    in_other_terms: ClassVar[Any] = None
 
     @classmethod
     def simplified(cls, *args: Expression) -> Expression | None:
@@ -65,30 +66,30 @@ class RealFunction(Function):
     @classmethod
     def of_numbers(cls, *values: float) -> Number:
         """The value at numbers; nan where there is none."""
-        try:
-            return number(cls.on_floats(*values))
-        except OverflowError:
-            return number(math.inf)
-        except ValueError:
-            return NAN
+        with np.errstate(all="ignore"):
+            return number(float(cls.numpy(*values)))
 
     def slope(self, place: int = 0) -> Expression:
         """The derivative in one of the arguments."""
-        raise NotImplementedError(f"{type(self).__name__} has no derivative")
+        found: Expression = self.slopes[place](*self.args)
+        return found
 
 
 def _always(found: Range) -> Any:
     return staticmethod(lambda *parts: found)
 
 
+def _zero(*args: Expression) -> Expression:
+    return ZERO
+
+
 class Exp(RealFunction):
     """``e**u``."""
 
-    on_floats, numpy, code, bounds = staticmethod(math.exp), np.exp, "exp", op.EXP
+    is_exponential = True
+    numpy, code, bounds = np.exp, "exp", op.EXP
     range = staticmethod(exponential)
-
-    def slope(self, place: int = 0) -> Expression:
-        return self
+    slopes = (lambda u: Exp(u),)
 
     def raised(self, exponent: Number) -> Expression | None:
         return Exp(exponent * self.args[0])
@@ -97,204 +98,167 @@ class Exp(RealFunction):
 class Expm1(RealFunction):
     """``e**u - 1``."""
 
-    on_floats, numpy, code, bounds = staticmethod(math.expm1), np.expm1, "expm1", op.EXPM1
-
-    def slope(self, place: int = 0) -> Expression:
-        return Exp(self.args[0])
+    numpy, code, bounds = np.expm1, "expm1", op.EXPM1
+    slopes = (lambda u: Exp(u),)
 
 
 class Exp2(RealFunction):
     """``2**u``."""
 
-    on_floats, numpy, range = staticmethod(lambda u: 2.0**u), np.exp2, _always(POSITIVE)
+    numpy, range = np.exp2, _always(POSITIVE)
     in_other_terms = staticmethod(lambda u: Exp(number(math.log(2.0)) * u))
-
-    def slope(self, place: int = 0) -> Expression:
-        return number(math.log(2.0)) * self
+    slopes = (lambda u: number(math.log(2.0)) * Exp2(u),)
 
 
 class Log(RealFunction):
     """The natural logarithm."""
 
-    on_floats, numpy, code, bounds = staticmethod(math.log), np.log, "log", op.LOG
-
-    def slope(self, place: int = 0) -> Expression:
-        return 1 / self.args[0]
+    numpy, code, bounds = np.log, "log", op.LOG
+    slopes = (lambda u: 1 / u,)
 
 
 class Log1p(RealFunction):
     """``log(1 + u)``."""
 
-    on_floats, numpy, code, bounds = staticmethod(math.log1p), np.log1p, "log1p", op.LOG1P
-
-    def slope(self, place: int = 0) -> Expression:
-        return 1 / (1 + self.args[0])
+    numpy, code, bounds = np.log1p, "log1p", op.LOG1P
+    slopes = (lambda u: 1 / (1 + u),)
 
 
 class Log2(RealFunction):
     """The logarithm to the base 2."""
 
-    on_floats, numpy, code = staticmethod(math.log2), np.log2, "log2"
+    numpy, code = np.log2, "log2"
     in_other_terms = staticmethod(lambda u: Log(u) / number(math.log(2.0)))
-
-    def slope(self, place: int = 0) -> Expression:
-        return 1 / (number(math.log(2.0)) * self.args[0])
+    slopes = (lambda u: 1 / (number(math.log(2.0)) * u),)
 
 
 class Log10(RealFunction):
     """The logarithm to the base 10."""
 
-    on_floats, numpy, code = staticmethod(math.log10), np.log10, "log10"
+    numpy, code = np.log10, "log10"
     in_other_terms = staticmethod(lambda u: Log(u) / number(math.log(10.0)))
-
-    def slope(self, place: int = 0) -> Expression:
-        return 1 / (number(math.log(10.0)) * self.args[0])
+    slopes = (lambda u: 1 / (number(math.log(10.0)) * u),)
 
 
 class Sin(RealFunction):
     """The sine."""
 
-    on_floats, numpy, code, bounds = staticmethod(math.sin), np.sin, "sin", op.SIN
+    numpy, code, bounds = np.sin, "sin", op.SIN
     parity, range = -1, _always(closed(-1.0, 1.0))
-
-    def slope(self, place: int = 0) -> Expression:
-        return Cos(self.args[0])
+    slopes = (lambda u: Cos(u),)
 
 
 class Cos(RealFunction):
     """The cosine."""
 
-    on_floats, numpy, code, bounds = staticmethod(math.cos), np.cos, "cos", op.COS
+    numpy, code, bounds = np.cos, "cos", op.COS
     parity, range = 1, _always(closed(-1.0, 1.0))
-
-    def slope(self, place: int = 0) -> Expression:
-        return -Sin(self.args[0])
+    slopes = (lambda u: -Sin(u),)
 
 
 class Tan(RealFunction):
     """The tangent."""
 
-    on_floats, numpy, code, bounds, parity = staticmethod(math.tan), np.tan, "tan", op.TAN, -1
-
-    def slope(self, place: int = 0) -> Expression:
-        return 1 + power(self, TWO)
+    numpy, code, bounds, parity = np.tan, "tan", op.TAN, -1
+    slopes = (lambda u: 1 + power(Tan(u), TWO),)
 
 
 class Arcsin(RealFunction):
     """The arc sine."""
 
-    on_floats, numpy, code, bounds = staticmethod(math.asin), np.arcsin, "asin", op.ASIN
+    numpy, code, bounds = np.arcsin, "asin", op.ASIN
     parity, range = -1, _always(closed(-2.0, 2.0))
-
-    def slope(self, place: int = 0) -> Expression:
-        return 1 / sqrt(1 - power(self.args[0], TWO))
+    slopes = (lambda u: 1 / sqrt(1 - power(u, TWO)),)
 
 
 class Arccos(RealFunction):
     """The arc cosine."""
 
-    on_floats, numpy, code, bounds = staticmethod(math.acos), np.arccos, "acos", op.ACOS
+    numpy, code, bounds = np.arccos, "acos", op.ACOS
     range = _always(closed(0.0, 4.0))
-
-    def slope(self, place: int = 0) -> Expression:
-        return -1 / sqrt(1 - power(self.args[0], TWO))
+    slopes = (lambda u: -1 / sqrt(1 - power(u, TWO)),)
 
 
 class Arctan(RealFunction):
     """The arc tangent."""
 
-    on_floats, numpy, code, bounds = staticmethod(math.atan), np.arctan, "atan", op.ATAN
+    numpy, code, bounds = np.arctan, "atan", op.ATAN
     parity, range = -1, _always(closed(-2.0, 2.0))
-
-    def slope(self, place: int = 0) -> Expression:
-        return 1 / (1 + power(self.args[0], TWO))
+    slopes = (lambda u: 1 / (1 + power(u, TWO)),)
 
 
 class Sinh(RealFunction):
     """The hyperbolic sine."""
 
-    on_floats, numpy, code, bounds, parity = staticmethod(math.sinh), np.sinh, "sinh", op.SINH, -1
-
-    def slope(self, place: int = 0) -> Expression:
-        return Cosh(self.args[0])
+    numpy, code, bounds, parity = np.sinh, "sinh", op.SINH, -1
+    slopes = (lambda u: Cosh(u),)
 
 
 class Cosh(RealFunction):
     """The hyperbolic cosine."""
 
-    on_floats, numpy, code, bounds = staticmethod(math.cosh), np.cosh, "cosh", op.COSH
+    numpy, code, bounds = np.cosh, "cosh", op.COSH
     parity, range = 1, _always(closed(1.0, math.inf))
-
-    def slope(self, place: int = 0) -> Expression:
-        return Sinh(self.args[0])
+    slopes = (lambda u: Sinh(u),)
 
 
 class Tanh(RealFunction):
     """The hyperbolic tangent."""
 
-    on_floats, numpy, code, bounds = staticmethod(math.tanh), np.tanh, "tanh", op.TANH
+    numpy, code, bounds = np.tanh, "tanh", op.TANH
     parity, range = -1, _always(Range(End(-1.0, False), End(1.0, False)))
-
-    def slope(self, place: int = 0) -> Expression:
-        return 1 - power(self, TWO)
+    slopes = (lambda u: 1 - power(Tanh(u), TWO),)
 
 
 class Arcsinh(RealFunction):
     """The inverse of the hyperbolic sine."""
 
-    on_floats, numpy, code, bounds, parity = staticmethod(math.asinh), np.arcsinh, "asinh", op.ASINH, -1
-
-    def slope(self, place: int = 0) -> Expression:
-        return 1 / sqrt(power(self.args[0], TWO) + 1)
+    numpy, code, bounds, parity = np.arcsinh, "asinh", op.ASINH, -1
+    slopes = (lambda u: 1 / sqrt(power(u, TWO) + 1),)
 
 
 class Arccosh(RealFunction):
     """The inverse of the hyperbolic cosine."""
 
-    on_floats, numpy, code, bounds = staticmethod(math.acosh), np.arccosh, "acosh", op.ACOSH
+    numpy, code, bounds = np.arccosh, "acosh", op.ACOSH
     range = _always(NOT_NEGATIVE)
-
-    def slope(self, place: int = 0) -> Expression:
-        return 1 / (sqrt(self.args[0] - 1) * sqrt(self.args[0] + 1))
+    slopes = (lambda u: 1 / (sqrt(u - 1) * sqrt(u + 1)),)
 
 
 class Arctanh(RealFunction):
     """The inverse of the hyperbolic tangent."""
 
-    on_floats, numpy, code, bounds, parity = staticmethod(math.atanh), np.arctanh, "atanh", op.ATANH, -1
-
-    def slope(self, place: int = 0) -> Expression:
-        return 1 / (1 - power(self.args[0], TWO))
+    numpy, code, bounds, parity = np.arctanh, "atanh", op.ATANH, -1
+    slopes = (lambda u: 1 / (1 - power(u, TWO)),)
 
 
 class Hypot(RealFunction):
     """``sqrt(a**2 + b**2)``, with slope 0 at the origin."""
 
-    on_floats, numpy, code = staticmethod(math.hypot), np.hypot, "hypot"
+    numpy, code = np.hypot, "hypot"
     range = _always(NOT_NEGATIVE)
     in_other_terms = staticmethod(lambda a, b: sqrt(power(a, TWO) + power(b, TWO)))
-
-    def slope(self, place: int = 0) -> Expression:
-        return self.args[place] / self
+    slopes = (lambda a, b: a / Hypot(a, b), lambda a, b: b / Hypot(a, b))
 
 
 class PiecewiseConstant(RealFunction):
     """A function that is constant between its jumps."""
 
-    def slope(self, place: int = 0) -> Expression:
-        return ZERO
+    slopes = (_zero, _zero)
 
 
 class Floor(PiecewiseConstant):
     """The largest integer not above ``u``."""
 
     # ``math.floor`` in code gives an integer, which cannot hold every float.
-    on_floats, numpy, code, bounds = staticmethod(math.floor), np.floor, "np.floor", op.FLOOR
+    numpy: ClassVar[Any] = np.floor
+    code, bounds = "np.floor", op.FLOOR
 
 
 class Level(Floor):
     """A floor in a place where it does not jump: its jumps are events of their own."""
 
+    word = "floor"
     # Written so that a list of operations tells it from a floor that jumps.
     numpy = staticmethod(lambda u: np.floor(np.positive(np.positive(u))))
 
@@ -302,26 +266,27 @@ class Level(Floor):
 class Ceiling(PiecewiseConstant):
     """The smallest integer not below ``u``."""
 
-    on_floats, numpy, code, bounds = staticmethod(math.ceil), np.ceil, "np.ceil", op.CEILING
+    word = "ceil"
+    numpy, code, bounds = np.ceil, "np.ceil", op.CEILING
 
 
 class Truncate(PiecewiseConstant):
     """``u`` without its fraction."""
 
-    on_floats, numpy, code, bounds = staticmethod(math.trunc), np.trunc, "np.trunc", op.TRUNCATE
+    word = "trunc"
+    numpy, code, bounds = np.trunc, "np.trunc", op.TRUNCATE
 
 
 class Sign(PiecewiseConstant):
     """-1, 0 or 1."""
 
-    on_floats, numpy = staticmethod(lambda u: float((u > 0) - (u < 0)) if u == u else u), np.sign
+    numpy = np.sign
     bounds, range = op.SIGN, _always(closed(-1.0, 1.0))
 
 
 class Step(PiecewiseConstant):
     """1 where ``u > 0``, 0 where ``u < 0``, 1/2 at 0."""
 
-    on_floats = staticmethod(lambda u: 0.5 + 0.5 * ((u > 0) - (u < 0)))
     numpy, bounds = staticmethod(lambda u: np.heaviside(u, 0.5)), op.STEP
     range = _always(closed(0.0, 1.0))
 
@@ -335,28 +300,30 @@ class Truth(PiecewiseConstant):
 class Less(Truth):
     """Whether ``a < b``."""
 
-    on_floats, numpy = staticmethod(lambda a, b: float(a < b)), staticmethod(lambda a, b: a < b)
+    numpy = staticmethod(lambda a, b: a < b)
     bounds = op.LESS
 
 
 class LessEqual(Truth):
     """Whether ``a <= b``."""
 
-    on_floats, numpy = staticmethod(lambda a, b: float(a <= b)), staticmethod(lambda a, b: a <= b)
+    word = "less_equal"
+    numpy = staticmethod(lambda a, b: a <= b)
     bounds = op.LESS_EQUAL
 
 
 class Equal(Truth):
     """Whether ``a == b``."""
 
-    on_floats, numpy = staticmethod(lambda a, b: float(a == b)), staticmethod(lambda a, b: a == b)
+    numpy = staticmethod(lambda a, b: a == b)
     bounds = op.EQUAL
 
 
 class And(Truth):
     """Whether both hold; a number other than 0 does."""
 
-    on_floats, numpy, bounds = staticmethod(lambda a, b: float(bool(a and b))), np.logical_and, op.AND
+    word = "logical_and"
+    numpy, bounds = np.logical_and, op.AND
 
     @classmethod
     def simplified(cls, *args: Expression) -> Expression | None:
@@ -366,7 +333,8 @@ class And(Truth):
 class Or(Truth):
     """Whether one of two holds; a number other than 0 does."""
 
-    on_floats, numpy, bounds = staticmethod(lambda a, b: float(bool(a or b))), np.logical_or, op.OR
+    word = "logical_or"
+    numpy, bounds = np.logical_or, op.OR
 
     @classmethod
     def simplified(cls, *args: Expression) -> Expression | None:
@@ -379,24 +347,24 @@ def _decided(connective: Any, args: tuple[Expression, ...]) -> Expression | None
     """The value for two numbers; for a number that decides nothing the other argument, if it is 0 or 1."""
     others = [each for each in args if not each.is_number]
     if not others:
-        return number(connective.on_floats(*map(float, args)))
+        return connective.of_numbers(*map(float, args))
     return others[0] if len(others) == 1 and isinstance(others[0], Truth) else None
 
 
 class Not(Truth):
     """Whether ``a`` is 0."""
 
-    on_floats, numpy, bounds = staticmethod(lambda a: float(not a)), np.logical_not, op.NOT
+    word = "logical_not"
+    numpy, bounds = np.logical_not, op.NOT
 
 
 class Absolute(RealFunction):
     """``|u|``, with slope 0 at 0."""
 
-    on_floats, numpy, code, bounds = staticmethod(abs), np.abs, "abs", op.ABSOLUTE
+    word = "abs"
+    numpy, code, bounds = np.abs, "abs", op.ABSOLUTE
     parity, range = 1, staticmethod(absolute)
-
-    def slope(self, place: int = 0) -> Expression:
-        return Sign(self.args[0])
+    slopes = (lambda u: Sign(u),)
 
     def raised(self, exponent: Number) -> Expression | None:
         return power(self.args[0], exponent) if exponent.is_whole and exponent.value % 2 == 0 else None
@@ -409,92 +377,84 @@ class Extreme(RealFunction):
     def simplified(cls, *args: Expression) -> Expression | None:
         return args[0] if args[0] is args[1] else super().simplified(*args)
 
-    def _lead(self, place: int) -> Expression:
-        """By how much one argument exceeds the other."""
-        return self.args[place] - self.args[1 - place]
-
 
 class Maximum(Extreme):
     """The larger of two."""
 
-    on_floats, numpy, bounds = staticmethod(max), np.maximum, op.MAXIMUM
+    numpy: ClassVar[Any] = np.maximum
+    bounds = op.MAXIMUM
     range = staticmethod(extreme(max))
-
-    def slope(self, place: int = 0) -> Expression:
-        return Step(self._lead(place))
+    slopes = (lambda a, b: Step(a - b), lambda a, b: Step(b - a))
 
 
 class Minimum(Extreme):
     """The smaller of two."""
 
-    on_floats, numpy, bounds = staticmethod(min), np.minimum, op.MINIMUM
+    numpy: ClassVar[Any] = np.minimum
+    bounds = op.MINIMUM
     range = staticmethod(extreme(min))
-
-    def slope(self, place: int = 0) -> Expression:
-        return Step(-self._lead(place))
+    slopes = (lambda a, b: Step(b - a), lambda a, b: Step(a - b))
 
 
 class LargerNumber(Maximum):
     """The larger of two, or the one that is a number if the other is nan."""
 
+    word = "fmax"
     numpy, range = np.fmax, _always(ANYTHING)
 
 
 class SmallerNumber(Minimum):
     """The smaller of two, or the one that is a number if the other is nan."""
 
+    word = "fmin"
     numpy, range = np.fmin, _always(ANYTHING)
 
 
 class WholeQuotient(PiecewiseConstant):
     """``floor(a/b)`` of the exact quotient: ``1 // 0.1`` is 9, because 0.1 is stored as a little more."""
 
-    on_floats, numpy = staticmethod(lambda a, b: float(np.floor_divide(a, b))), np.floor_divide
+    word = "floor_divide"
+    numpy = np.floor_divide
     in_other_terms = staticmethod(lambda a, b: Floor(a / b))
 
 
 class Remainder(RealFunction):
     """``a - b*floor(a/b)``, with the sign of ``b``."""
 
-    on_floats, numpy = staticmethod(lambda a, b: a % b if b else math.nan), np.remainder
-
-    def slope(self, place: int = 0) -> Expression:
-        return ONE if place == 0 else -Floor(self.args[0] / self.args[1])
+    word = "mod"
+    numpy = np.remainder
+    slopes = (lambda a, b: ONE, lambda a, b: -Floor(a / b))
 
 
 class TruncatedRemainder(RealFunction):
     """``a - b*trunc(a/b)``, with the sign of ``a``."""
 
-    on_floats, numpy, code = staticmethod(lambda a, b: math.fmod(a, b) if b else math.nan), np.fmod, "np.fmod"
-
-    def slope(self, place: int = 0) -> Expression:
-        return ONE if place == 0 else -Truncate(self.args[0] / self.args[1])
+    word = "fmod"
+    numpy, code = np.fmod, "np.fmod"
+    slopes = (lambda a, b: ONE, lambda a, b: -Truncate(a / b))
 
 
 class Atan2(RealFunction):
     """The angle of the point ``(x, y)``, called with ``y`` first."""
 
-    on_floats, numpy, code, bounds = staticmethod(math.atan2), np.arctan2, "atan2", op.ANGLE
+    word = "arctan2"
+    numpy, code, bounds = np.arctan2, "atan2", op.ANGLE
     range = _always(closed(-4.0, 4.0))
-
-    def slope(self, place: int = 0) -> Expression:
-        y, x = self.args
-        return (x if place == 0 else -y) / (x**2 + y**2)
+    slopes = (lambda y, x: x / (x**2 + y**2), lambda y, x: -y / (x**2 + y**2))
 
 
 class CubeRoot(RealFunction):
     """The real cube root, with the sign of ``u``."""
 
-    on_floats = staticmethod(lambda u: math.copysign(abs(u) ** (1 / 3), u))
+    word = "cbrt"
     numpy, bounds, parity = np.cbrt, op.CUBE_ROOT, -1
-
-    def slope(self, place: int = 0) -> Expression:
-        return 1 / (3 * power(self, TWO))
+    slopes = (lambda u: 1 / (3 * power(CubeRoot(u), TWO)),)
 
 
 class Select(RealFunction):
     """``a`` where the condition holds, else ``b``."""
 
+    word = "where"
     numpy, bounds, range = np.where, op.SELECT, staticmethod(either)
 
     @classmethod

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from hybrid.expression.graph import mentions, once
-from hybrid.expression.nodes import ONE, Expression, Number, Symbol, add, in_order, multiply, split
+from hybrid.expression.graph import in_order, is_positive, is_whole, mentions, once
+from hybrid.expression.nodes import ONE, Expression, Number, Symbol, add, multiply, split
 
 Coefficients = dict[Expression, Any]
 # A sum of floats that is this small a share of its terms is their rounding.
@@ -42,12 +42,11 @@ def _written_out(node: Expression, known: Mapping[Expression, Coefficients]) -> 
         for each in node.args:
             made = _multiplied(made, known[each])
         return made
-    if node.is_power and node.exponent.is_number and node.exponent.is_whole and len(known[node.base]) > 1:
-        if node.exponent.value > 0:
-            made = {ONE: 1}
-            for _ in range(node.exponent.value):
-                made = _multiplied(made, known[node.base])
-            return made
+    if node.is_power and is_whole(node.exponent) and is_positive(node.exponent) and len(known[node.base]) > 1:
+        made = {ONE: 1}
+        for _ in range(node.exponent.value):
+            made = _multiplied(made, known[node.base])
+        return made
     factor, rest = split(node.rebuilt([_summed(known[each]) for each in node.args]))
     if rest.is_sum:
         return dict(coefficients_of(multiply(Number(factor), rest)))

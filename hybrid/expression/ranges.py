@@ -49,6 +49,7 @@ ANYTHING = closed(-math.inf, math.inf)
 NOT_NEGATIVE = closed(0.0, math.inf)
 POSITIVE = Range(End(0.0, False), NOT_NEGATIVE.high)
 
+
 def has_one_sign(expression: Expression) -> bool:
     """Whether an expression is proved to be above zero for all values of its symbols, or below zero."""
     found = range_of(expression)

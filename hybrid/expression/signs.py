@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hybrid.expression.graph import MOST_EXPANDED, contains, is_larger_than
-from hybrid.expression.nodes import ONE, ZERO, Expression, in_order, number
+from hybrid.expression.graph import MOST_EXPANDED, contains, in_order, is_larger_than
+from hybrid.expression.nodes import ONE, ZERO, Expression, number
 from hybrid.expression.operations import Absolute, Less, LessEqual, Maximum, Minimum, Select, Sign, Step
 from hybrid.expression.polynomials import coefficients_of
 

@@ -12,23 +12,20 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
-import numpy as np
 
 from hybrid.expression.derivatives import derivative
-from hybrid.expression.graph import all_replaced, contains, is_larger_than, mentions, nodes_of, replaced
-from hybrid.expression.nodes import (
-    ONE,
-    ZERO,
-    Expression,
-    Number,
-    Power,
-    Symbol,
+from hybrid.expression.graph import (
+    all_replaced,
     base_and_exponent,
+    contains,
     factors_of,
-    multiply,
-    number,
-    power,
+    is_larger_than,
+    mentions,
+    nodes_of,
+    replaced,
 )
+from hybrid.expression.implications import MOST_TERMS, follows
+from hybrid.expression.nodes import ONE, ZERO, Expression, Number, Power, Symbol, multiply, number, power
 from hybrid.expression.operations import (
     Absolute,
     Ceiling,
@@ -60,12 +57,8 @@ COMPARISONS = (Less, LessEqual, Equal)
 COUNTS = (Floor, Ceiling, Truncate, WholeQuotient, Remainder, TruncatedRemainder)
 SWITCHING = (*COMPARISONS, *COUNTS, Sign, Step, Absolute, Maximum, Minimum)
 QUARTER = number(0.25)
-# Surfaces written as longer trees are not expanded, so two of them are the same only if written alike.
-MOST_TERMS = 200
 # Digits to which coefficients of surfaces are compared.
 DIGITS = 12
-# Rounding of these coefficients, as a share of the largest.
-ROUNDING = 1e-12
 
 
 # What a surface that is both ends of a pulse keeps: see ``Surface.pulse``.
@@ -136,47 +129,37 @@ class Surfaces:
         sides
             By number of a surface: -1 below, 1 above, 0 on it; -2 and 2 on it, with the branch of that side.
         """
-        key = number, frozenset((other, side) for other, side in sides.items() if other != number)
+        nearest = self._nearest(number, sides)
+        key = number, frozenset(nearest.items())
         if key not in self._implied:
-            given = [(self.known[other].height, side) for other, side in key[1]]
-            height = self.known[number].height
-            self._implied[key] = next((side for side in (1, -1) if _follows(height, side, given)), None)
+            given = [(self.known[other].height, side) for other, side in nearest.items()]
+            surface = self.known[number]
+            side = self._by_parallels(surface, nearest)
+            follows = (each for each in (1, -1) if follows(surface.height, each, given))
+            self._implied[key] = side or next(follows, None)
         return self._implied[key]
 
+    def _nearest(self, number: int, sides: Mapping[int, int]) -> dict[int, int]:
+        """The sides of the other surfaces, of parallel ones only those that say most."""
+        found: dict[tuple[str, int], tuple[float, int, int]] = {}
+        for other, side in sides.items():
+            if other == number:
+                continue
+            surface, direction = self.known[other], side if side in (-1, 1) else 0
+            bound = direction * surface.level, other, side
+            found[surface.core, direction] = max(found.get((surface.core, direction), bound), bound)
+        return {other: side for _, other, side in found.values()}
 
-def _follows(height: Expression, side: int, given: Sequence[tuple[Expression, int]]) -> bool:
-    """Whether a height is proved to have the sign ``side``, as a sum of others (Farkas' lemma).
-
-    It has if it is a positive constant plus a combination of the others, with factors that have the signs of
-    these others; a surface that the state lies on may have any factor. Products of states and parameters
-    count as variables of their own.
-    """
-    target = _monomials(height)
-    columns, strict = [{ONE: 1.0}], [True]
-    for other, on in given:
-        row = _monomials(other)
-        if row is None:
-            continue
-        signs = (1.0, -1.0) if on in (0, -2, 2) else (float(on),)
-        columns += [{name: sign * factor for name, factor in row.items()} for sign in signs]
-        strict += [on in (-1, 1)] * len(signs)
-    if target is None or not target.keys() <= {name for row in columns for name in row}:
-        return False
-    # SciPy's optimisers take half a second to import.
-    from scipy.optimize import nnls
-
-    names = [*{name for row in [*columns, target] for name in row}]
-    matrix = np.array([[row.get(name, 0.0) for row in columns] for name in names])
-    factors, distance = nnls(matrix, np.array([side * target.get(name, 0.0) for name in names]))
-    scale = max(map(abs, target.values()))
-    return bool(distance <= ROUNDING * scale and np.any(factors[strict] > ROUNDING * scale))
-
-
-def _monomials(height: Expression) -> dict[Expression, float] | None:
-    """Coefficients of the products of symbols in a height; None if it is too long to be expanded."""
-    if is_larger_than(MOST_TERMS, height):
+    def _by_parallels(self, surface: Surface, sides: Mapping[int, int]) -> int | None:
+        """The side of a surface that those of parallel ones imply."""
+        for other, side in sides.items():
+            beside = self.known[other]
+            above = beside.level - surface.level
+            if beside.core == surface.core and (above > 0 or side == 1) and above >= 0 and side != -1:
+                return 1
+            if beside.core == surface.core and (above < 0 or side == -1) and above <= 0 and side != 1:
+                return -1
         return None
-    return {name: float(factor) for name, factor in coefficients_of(height).items()}
 
 
 def _core(height: Expression, symbols: Symbols) -> tuple[str, float, int]:
@@ -287,10 +270,10 @@ class Switches:
             base, exponent = base_and_exponent(factor)
             whole = isinstance(exponent, Number) and exponent.is_whole
             even = whole and exponent.value % 2 == 0
-            if even or isinstance(factor, Exp) or _follows(base, 1, given):
+            if even or isinstance(factor, Exp) or follows(base, 1, given):
                 continue
             found = range_of(factor)
-            if whole and (found.negative or _follows(base, -1, given)):
+            if whole and (found.negative or follows(base, -1, given)):
                 sign = -sign
             elif not found.positive:
                 kept.append(factor)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fractions import Fraction
 
-from hybrid.expression.nodes import Expression, Number, Symbol, factors_of, power, split
+from hybrid.expression.graph import factors_of
+from hybrid.expression.nodes import Expression, Number, Symbol, power, split
 
 # How tightly a text binds.
 SUM, PRODUCT, POWER, ATOM = range(4)
@@ -38,7 +39,7 @@ class _Writer:
         if expression.is_power:
             return self._power(*expression.args)
         arguments = ", ".join(map(self.text, expression.args))
-        return f"{type(expression).__name__}({arguments})", ATOM
+        return f"{expression.word}({arguments})", ATOM
 
     def _sum(self, expression: Expression) -> str:
         """Terms with a plus first, if there is one."""
@@ -48,7 +49,8 @@ class _Writer:
 
     def _product(self, expression: Expression) -> str:
         coefficient, rest = split(expression)
-        above, below = [], []
+        above: list[str] = []
+        below: list[str] = []
         for factor in sorted(factors_of(rest), key=self._rank):
             if factor.is_power and factor.exponent.leads_with_minus and factor.exponent.is_number:
                 below.append(self.text(power(factor.base, -factor.exponent), POWER))

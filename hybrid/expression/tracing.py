@@ -12,6 +12,7 @@ import attrs
 from hybrid.errors import ModelError
 from hybrid.expression.graph import is_larger_than, nodes
 from hybrid.expression.nodes import Expression, Number, Symbol, number
+from hybrid.expression.text import text
 from hybrid.expression.ufuncs import RULES
 from hybrid.expression.values import Traced as Traced
 from hybrid.expression.values import TraceError as TraceError
@@ -110,6 +111,6 @@ def trace(
         raise TraceError(_told(error)) from error
     for node in nodes(*expressions):
         if isinstance(node, Number) and node.value != node.value:
-            shown = next((str(each) for each in expressions if not is_larger_than(SHOWN, each)), str(node))
+            shown = next((text(each) for each in expressions if not is_larger_than(SHOWN, each)), text(node))
             raise TraceError(f"it is not a real number everywhere: {shown}")
     return expressions

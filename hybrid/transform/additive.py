@@ -96,8 +96,5 @@ def _solved(matrix: Matrix, right: Field) -> Field | None:
         for i in range(size):
             if i != k and rows[i][k] is not ZERO:
                 factor = rows[i][k] * power(pivot[k], MINUS_ONE)
-                rows[i] = [
-                    ZERO if j == k else entry - factor * pivot[j]
-                    for j, entry in enumerate(rows[i])
-                ]
+                rows[i] = [ZERO if j == k else entry - factor * pivot[j] for j, entry in enumerate(rows[i])]
     return [rows[k][size] * power(rows[k][k], MINUS_ONE) for k in range(size)]

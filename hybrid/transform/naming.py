@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import count
 
-from hybrid.expression.graph import is_larger_than, mentions, nodes_of, replaced, symbols_of
-from hybrid.expression.nodes import Expression, Symbol, add, number, split, terms_of
+from hybrid.expression.graph import is_larger_than, mentions, nodes_of, replaced, symbols_of, terms_of
+from hybrid.expression.nodes import Expression, Symbol, add, number, split
 from hybrid.expression.operations import Level
 from hybrid.expression.polynomials import expanded
 from hybrid.expression.switches import QUARTER, Surface
@@ -61,7 +61,9 @@ class Names:
         self.taken.add(name)
         self.short[number] = name
         long = is_larger_than(MOST_SHOWN, height)
-        self.notes.append(f"{name} = {'a long expression' if long else self._text(self._without_levels(height))}")
+        self.notes.append(
+            f"{name} = {'a long expression' if long else self._text(self._without_levels(height))}"
+        )
 
     def cell(self, surfaces: Sequence[Surface], sides: Sequence[tuple[int, int]]) -> str:
         """Name of a cell by its sides; empty if there are none."""

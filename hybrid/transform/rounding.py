@@ -24,5 +24,7 @@ def combined(*terms: tuple[int, Expression]) -> Expression:
             totals[product] += sign * factor
             sizes[product] += abs(float(factor))
     # What is no number, as infinity less infinity, stays.
-    left = ((total, each) for each, total in totals.items() if not abs(float(total)) <= ROUNDING * sizes[each])
+    left = (
+        (total, each) for each, total in totals.items() if not abs(float(total)) <= ROUNDING * sizes[each]
+    )
     return add(*(multiply(Number(total), each) for total, each in left))

@@ -16,20 +16,19 @@ import attrs
 
 from hybrid.compiler.taylor.roots import is_multiple
 from hybrid.expression.continuity import ROUNDING
-from hybrid.expression.graph import degree_of, mentions, nodes, nodes_of, once
-from hybrid.expression.nodes import (
-    ZERO,
-    Expression,
-    Power,
-    Symbol,
-    add,
+from hybrid.expression.graph import (
+    degree_of,
     factors_of,
     is_negative,
     is_positive,
     is_whole,
-    number,
+    mentions,
+    nodes,
+    nodes_of,
+    once,
     terms_of,
 )
+from hybrid.expression.nodes import ZERO, Expression, Power, Symbol, add, number
 from hybrid.expression.operations import (
     Absolute,
     Arccos,
@@ -169,9 +168,9 @@ def _in_state(
             arguments.update(dict.fromkeys(found))
             terms[-1] += [term] if found else []
     yield Forcing(Several(*arguments) if arguments else None, NO_COMPONENT, ARGUMENTS)
-    for i, entry in enumerate(terms):
-        if entry:
-            yield Forcing(add(*entry), i, TERMS)
+    for i, own in enumerate(terms):
+        if own:
+            yield Forcing(add(*own), i, TERMS)
 
 
 def arguments_of(expression: Expression, variables: tuple[Symbol, ...]) -> list[Expression]:
@@ -273,7 +272,8 @@ def _saturates(node: Expression, variables: tuple[Symbol, ...], roots: frozenset
         if degree is not None and degree > MOST_FACTORS:
             return True
     if node.is_power and (
-        mentions(node.exponent, variables) or (is_whole(node.exponent) and abs(node.exponent.value) > MOST_FACTORS)
+        mentions(node.exponent, variables)
+        or (is_whole(node.exponent) and abs(node.exponent.value) > MOST_FACTORS)
     ):
         return True
     if isinstance(node, BRANCHING) or (node.is_power and not is_whole(node.exponent) and node not in roots):

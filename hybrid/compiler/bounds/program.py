@@ -13,15 +13,8 @@ from typing import ClassVar
 
 from hybrid.compiler.bounds.forcing import is_harmless
 from hybrid.compiler.emitted import Programs
-from hybrid.expression.nodes import (
-    HALF,
-    Expression,
-    Number,
-    Product,
-    Sum,
-    is_negative,
-    is_whole,
-)
+from hybrid.expression.graph import is_negative, is_whole
+from hybrid.expression.nodes import HALF, Expression, Number, Product, Sum
 from hybrid.expression.operations import Remainder, Several, TruncatedRemainder
 from hybrid.expression.tracing import Symbols
 from hybrid.kernels.arithmetic import operations as op
@@ -84,7 +77,9 @@ class _Writer:
         marks = [0] * (len(self.rows) - 1) + [1]
         several = [each for each in self.places if isinstance(each, Several)]
         if several:
-            return [int(row in {self.places[each] for each in several[0]}) for row in range(len(self.rows))]
+            return [
+                int(row in {self.places[each] for each in several[0].args}) for row in range(len(self.rows))
+            ]
         for expression, row in self.places.items():
             if not is_harmless(expression, self.times):
                 marks[row] = 1

@@ -13,8 +13,8 @@ import attrs
 
 from hybrid.compiler.taylor.roots import is_multiple, singular_bases, with_fractions
 from hybrid.expression.derivatives import derivative, partial_derivatives
-from hybrid.expression.graph import mentions, nodes
-from hybrid.expression.nodes import ZERO, Expression, Symbol, is_positive, is_whole
+from hybrid.expression.graph import is_positive, is_whole, mentions, nodes
+from hybrid.expression.nodes import ZERO, Expression, Symbol
 from hybrid.expression.operations import Cos, Cosh, Exp, Sin, Sinh
 from hybrid.expression.signs import sign_of, simplified
 from hybrid.expression.tracing import Symbols

@@ -5,8 +5,7 @@ from __future__ import annotations
 from hybrid.compiler.emitted import Propagator
 from hybrid.compiler.propagators.equations import Equations
 from hybrid.compiler.propagators.writing import write_series
-from hybrid.expression.graph import nodes
-from hybrid.expression.nodes import is_whole
+from hybrid.expression.graph import is_whole, nodes
 from hybrid.expression.operations import Hypot
 from hybrid.kernels.types.codes import TAYLOR
 

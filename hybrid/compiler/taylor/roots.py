@@ -12,7 +12,20 @@ import numpy as np
 from hybrid.compiler.taylor.series import NoSeries
 from hybrid.expression.derivatives import derivative
 from hybrid.expression.evaluation import Program
-from hybrid.expression.graph import MOST_EXPANDED, is_larger_than, mentions, nodes_of, replaced, symbols_of
+from hybrid.expression.graph import (
+    MOST_EXPANDED,
+    base_and_exponent,
+    factors_of,
+    is_larger_than,
+    is_negative,
+    is_positive,
+    is_whole,
+    mentions,
+    nodes_of,
+    replaced,
+    symbols_of,
+    terms_of,
+)
 from hybrid.expression.nodes import (
     ZERO,
     Expression,
@@ -20,21 +33,16 @@ from hybrid.expression.nodes import (
     Power,
     Symbol,
     add,
-    base_and_exponent,
-    factors_of,
-    is_negative,
-    is_positive,
-    is_whole,
     multiply,
     number,
     order_of,
     power,
-    terms_of,
 )
 from hybrid.expression.operations import CubeRoot
 from hybrid.expression.polynomials import expanded, ratio
 from hybrid.expression.ranges import range_of
 from hybrid.expression.signs import sign_of
+from hybrid.expression.text import text
 from hybrid.expression.tracing import Symbols
 
 ROOT = Symbol("w", positive=True)
@@ -87,12 +95,11 @@ def singular_bases(
             continue
         if not any(is_multiple(base, guard, symbols) for guard in known):
             if not range_of(base).low.value >= 0.0:
-                raise NoSeries(
-                    f"it has the power {exponent} of an expression that may change sign and is not a guard"
-                )
+                power_of = f"it has the power {text(exponent)} of an expression"
+                raise NoSeries(f"{power_of} that may change sign and is not a guard")
             continue
         if not (is_positive(exponent) and exponent.is_exact):
-            raise NoSeries(f"it has the power {exponent} of a guard")
+            raise NoSeries(f"it has the power {text(exponent)} of a guard")
         bases.setdefault(base, []).append(Fraction(exponent.value))
     return {base: _order(bases[base]) for base in sorted(bases, key=order_of)}
 
@@ -108,7 +115,11 @@ def _order(exponents: Sequence[Fraction]) -> int:
 
 def is_multiple(expression: Expression, other: Expression, symbols: Symbols) -> bool:
     """Whether an expression is a multiple of another, with a factor that depends on parameters only."""
-    if other is ZERO or is_larger_than(MOST_EXPANDED, expression) or _ratio_varies(expression, other, symbols):
+    if (
+        other is ZERO
+        or is_larger_than(MOST_EXPANDED, expression)
+        or _ratio_varies(expression, other, symbols)
+    ):
         return False
     return ratio(expression, other, symbols.variables) is not None
 

@@ -10,27 +10,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 from hybrid.compiler.taylor.sums import Term, added
 from hybrid.expression.code import power_text
 from hybrid.expression.constants import Constants
 from hybrid.expression.derivatives import derivative
-from hybrid.expression.graph import mentions, nodes, symbols_of
-from hybrid.expression.nodes import (
-    ONE,
-    TWO,
-    ZERO,
-    Expression,
-    Symbol,
-    add,
-    factors_of,
-    is_negative,
-    is_whole,
-    multiply,
-    number,
-    power,
-    terms_of,
-)
+from hybrid.expression.graph import factors_of, is_negative, is_whole, mentions, nodes, symbols_of, terms_of
+from hybrid.expression.nodes import ONE, TWO, ZERO, Expression, Symbol, add, multiply, number, power
 from hybrid.expression.operations import (
     Arccos,
     Arccosh,
@@ -119,7 +106,7 @@ class Recurrences:
         at_start: Mapping[Expression, str] | None = None,
         lanes: bool = False,
     ) -> None:
-        self.rows: dict[Expression, str] = dict(rows)
+        self.rows: dict[Any, str] = {**rows}
         self.lanes = lanes
         self.time = time
         self.allot = allot
