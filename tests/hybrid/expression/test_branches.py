@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from hybrid.expression.branches import OTHERWISE
-from hybrid.expression.tracing import TraceError, trace
+from hybrid.expression.tracing import trace
+from hybrid.expression.values import TraceError
 
 STATE, PARAMETERS = ("q", "v"), ("mu",)
 

@@ -25,7 +25,6 @@ from hybrid.expression.operations import (
     Not,
     Or,
     Select,
-    Sign,
     Sin,
     Step,
 )
@@ -81,10 +80,6 @@ def test_half_integer_powers_in_series(exponent):
 @pytest.mark.parametrize(
     ("expression", "function"),
     [
-        (Step(X), lambda x, y: np.heaviside(x, 0.5)),
-        (Sign(X), lambda x, y: np.sign(x)),
-        (Maximum(X, Y), np.maximum),
-        (Minimum(X, Y), np.minimum),
         (Maximum(X, 1), lambda x, y: np.maximum(x, 1.0)),
         (Minimum(1, X), lambda x, y: np.minimum(x, 1.0)),
         (Gate(X, Y), lambda x, y: 0.0 if x < 0 else np.heaviside(x, 0.5) * y),
@@ -102,12 +97,9 @@ def test_ties_infinities_and_nan(expression, function):
 @pytest.mark.parametrize(
     ("condition", "holds"),
     [
-        (Less(X, Y), lambda x, y: x < y),
-        (LessEqual(X, Y), lambda x, y: x <= y),
         (Equal(X, Y), lambda x, y: x == y),
-        (Not(Less(X, Y)), lambda x, y: not x < y),
         (And(Less(X, Y), Less(X, ONE)), lambda x, y: x < y and x < 1),
-        (Not(Or(Less(X, Y), Not(Less(X, ONE)))), lambda x, y: not (x < y or not x < 1)),
+        (Not(Or(LessEqual(X, Y), Not(Less(X, ONE)))), lambda x, y: not (x <= y or not x < 1)),
         (And(Or(Less(X, Y), Less(ONE, Y)), Less(X, ONE)), lambda x, y: (x < y or y > 1) and x < 1),
         # A number is true unless it is zero.
         (And(X, Y), lambda x, y: bool(x and y)),

@@ -12,21 +12,11 @@ from hybrid.expression.tracing import model_symbols, trace
 SYMBOLS = model_symbols(2, 1)
 (Q, V), (K,), T = SYMBOLS.x, SYMBOLS.p, SYMBOLS.t
 FUNCTIONS = {
-    "arithmetic": lambda t, x, p: x[0] * x[1] - t / p[0] + x[0] ** 3 - x[0] ** 1.5,
-    "exponentials": lambda t, x, p: np.exp(x[1]) + np.log(x[0]) + np.exp2(x[1]) - np.expm1(x[0]),
-    "logarithms": lambda t, x, p: np.log1p(x[0]) + 10 * np.log2(x[0]) + 100 * np.log10(x[0]),
-    "circular": lambda t, x, p: np.sin(x[0]) + np.cos(x[1]) * np.tan(t) + np.arcsin(x[0]),
-    "inverse": lambda t, x, p: np.arccos(x[0]) + 10 * np.arctan(x[1]) + np.arctan2(x[1], x[0]),
-    "hyperbolic": lambda t, x, p: np.sinh(x[0]) + np.cosh(x[1]) * np.tanh(t),
-    "inverse hyperbolic": lambda t, x, p: np.arcsinh(x[1]) + np.arccosh(p[0]) + np.arctanh(x[0]),
-    "roots": lambda t, x, p: np.sqrt(x[0]) + np.cbrt(x[1]) + np.hypot(x[0], x[1]),
-    "kinks": lambda t, x, p: np.abs(x[1]) + 2 * np.maximum(x[0], x[1]) + 4 * np.minimum(x[0], t),
-    "jumps": lambda t, x, p: np.sign(x[1]) + np.heaviside(x[0], 0.5) + np.heaviside(-x[0], 0.5),
-    "rounding": lambda t, x, p: np.floor(x[1]) + 10 * np.ceil(x[1]) + 100 * np.trunc(x[1]),
-    "remainders": lambda t, x, p: np.mod(x[1], 0.4) + 10 * np.fmod(x[1], 0.4),
+    "smooth": lambda t, x, p: x[0] * x[1] - t / p[0] + x[0] ** 1.5 + np.exp(np.sin(x[1])) - np.pi,
+    "kinks": lambda t, x, p: np.abs(x[1]) + 2 * np.maximum(x[0], x[1]) + np.hypot(x[0], x[1]) + np.cbrt(x[1]),
+    "jumps": lambda t, x, p: np.sign(x[1]) + np.heaviside(x[0], 0.5) + 10 * np.ceil(x[1]) + np.mod(x[1], 0.4),
     "choices": lambda t, x, p: np.where((x[0] < x[1]) | (x[0] == t), 1.0, np.where(x[1] <= t, 2.0, 3.0)),
     "connectives": lambda t, x, p: np.where((x[0] > 0) & ~(x[1] > 0), x[0], x[1]),
-    "numbers": lambda t, x, p: np.pi * x[0] + 2.5,
 }
 PLACES = [(0.3, (0.45, -1.3), (1.7,)), (1.1, (0.8, 0.6), (2.5,))]
 

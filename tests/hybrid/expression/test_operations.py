@@ -189,9 +189,9 @@ def compiled():
 
 @every
 def test_code_has_the_values_of_numpy(kind, compiled):
-    """As Python and as machine code; at zeros, ties and nan, too."""
+    """As Python and as machine code; at zeros, ties, infinities and nan, too."""
     n = len(DOMAINS[kind])
-    edges = np.array(np.meshgrid(*[[0.0, 1.0, -2.0, np.nan]] * n)).reshape(n, -1).T
+    edges = np.array(np.meshgrid(*[[0.0, 1.0, -2.0, np.inf, -np.inf, np.nan]] * n)).reshape(n, -1).T
     out = np.empty(1)
     for function in compiled:
         for x in [*places(kind), *edges]:

@@ -6,8 +6,8 @@ from fractions import Fraction
 import pytest
 from hypothesis import assume, given
 
-from hybrid.expression.graph import mentions
-from hybrid.expression.nodes import ONE, ZERO, number, terms_of
+from hybrid.expression.graph import mentions, terms_of
+from hybrid.expression.nodes import ONE, ZERO, number
 from hybrid.expression.operations import Exp, Sin
 from hybrid.expression.polynomials import coefficients_of, expanded, is_zero, ratio
 from tests.hybrid.expression.formulas import X, Y, Z, anything, at, expression_of, places, polynomials

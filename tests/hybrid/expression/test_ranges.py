@@ -1,58 +1,41 @@
 """Ranges of random expressions hold their values, and prove signs that are plain to see."""
 
 import math
-import random
+from fractions import Fraction
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from hybrid.expression import operations as ops
 from hybrid.expression.ranges import End, Range, has_one_sign, range_of
 from hybrid.expression.tracing import trace
+from tests.hybrid.expression.formulas import KINKED, POLYNOMIAL, SMOOTH, expression_of, formulas, of, plainly
 
 STATES, PARAMETERS = ("q", "v"), ("k",)
-OF_ONE = (
-    np.sin, np.cos, np.exp, np.tanh, np.arctan, np.cosh, np.abs, np.sqrt, np.square, np.sign, np.exp2,
-    np.negative, lambda a: a**-1.0, lambda a: a**-2.0, lambda a: a**3, lambda a: a**1.5, lambda a: 2.0**a,
-    lambda a: np.heaviside(a, 0.5),
-)  # fmt: skip
-OF_TWO = (
-    np.add, np.add, np.add, np.subtract, np.multiply, np.multiply, np.divide, np.maximum, np.minimum,
-    np.hypot, np.arctan2, lambda a, b: np.where(a > 0, a, b), lambda a, b: np.abs(a) ** b,
-)  # fmt: skip
-NUMBERS = (0.0, 1.0, -1.0, 0.5, 2.0, -3.0, 0.1, 1.1, 100.0)
+OTHERS = {
+    1: (
+        *(of(kind) for kind in (ops.Exp, ops.Exp2, ops.Cosh, ops.Sign)),
+        *(lambda a: a**-1, lambda a: a**-2, lambda a: a ** Fraction(3, 2), lambda a: 2.0**a),
+    ),
+    2: (
+        *(of(kind) for kind in (ops.Hypot, ops.Atan2)),
+        lambda a, b: a / b,
+        lambda a, b: of(ops.Absolute)(a) ** b,
+    ),
+}
+numbers = st.one_of(st.just(0.0), st.floats(-1e3, 1e3), st.floats(-1.0, 1.0))
 
 
-class Point:
-    def __init__(self, **values):
-        self.__dict__.update(values)
-
-
-def drawn(draw, depth):
-    """A random function of the model."""
-    if depth == 0 or draw.random() < 0.15:
-        number, name = draw.choice(NUMBERS), draw.choice("qvqk#")
-        return lambda t, x, p: number if name == "#" else getattr(p if name == "k" else x, name)
-    first, second = drawn(draw, depth - 1), drawn(draw, depth - 1)
-    if draw.random() < 0.5:
-        one = draw.choice(OF_ONE)
-        return lambda t, x, p: one(first(t, x, p))
-    two = draw.choice(OF_TWO)
-    return lambda t, x, p: two(first(t, x, p), second(t, x, p))
-
-
-@pytest.mark.parametrize("seed", range(100))
-def test_every_value_lies_in_the_range(seed):
-    draw, rng = random.Random(seed), np.random.default_rng(seed)
-    function = drawn(draw, draw.choice((2, 3, 4)))
-    try:
-        [expression] = trace(function, STATES, PARAMETERS)
-    except (ArithmeticError, ValueError):  # a function of numbers only, which is no number
-        return
-    found = range_of(expression)
-    for _ in range(60):
-        q, v, k = 10.0 ** rng.uniform(-3, 2) * rng.normal(size=3) * (rng.random(3) > 0.1)
-        with np.errstate(all="ignore"):
-            value = float(function(0.0, Point(q=q, v=v), Point(k=k)))
+@settings(max_examples=400)
+@given(
+    formulas(POLYNOMIAL, SMOOTH, KINKED, OTHERS, numbers=(0, 1, -3, 0.5, 0.1, 100)),
+    st.lists(st.tuples(numbers, numbers, numbers), min_size=20, max_size=20),
+)
+def test_every_value_lies_in_the_range(formula, places):
+    found = range_of(expression_of(formula))
+    for value in (plainly(formula, place) for place in places):
         if math.isnan(value):
             continue
         allowed = 1e-9 * (1.0 + abs(value))

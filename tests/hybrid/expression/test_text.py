@@ -11,7 +11,7 @@ from hybrid.expression.nodes import HALF, number
 from hybrid.expression.text import text
 from tests.hybrid.expression.formulas import X, Y, Z, anything, at, expression_of, places
 
-NAMES = {name: getattr(kind, "numpy", None) for name, kind in vars(ops).items()} | {"sqrt": np.sqrt}
+NAMES = {kind.word: kind.numpy for kind in vars(ops).values() if hasattr(kind, "numpy")} | {"sqrt": np.sqrt}
 
 
 def read(written, place):
@@ -26,7 +26,6 @@ def test_a_text_has_the_value_of_its_expression(formula, place):
     [wanted] = at([expression], place)
     assume(abs(wanted) < 1e6)
     assert read(text(expression), place) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
-    assert repr(expression) == text(expression)
 
 
 @pytest.mark.parametrize(
@@ -37,7 +36,6 @@ def test_a_text_has_the_value_of_its_expression(formula, place):
         *(1e-20 * X, 1.5e20 * X, number(-2.5), X**HALF * Y**-HALF, X ** Fraction(-2, 3), X ** number(0.3)),
         *(ops.Less(X, Y) - ops.Select(X, -Y, Z), ops.Sin(X - 1) ** 2, 2 ** ops.Exp(X), -ops.Sin(X) / 3),
     ],
-    ids=str,
 )
 def test_brackets_stand_where_they_must(expression):
     place = (0.7, 1.2, 0.4)
