@@ -27,7 +27,7 @@ def exact(value: Value) -> Value:
 def raised(base: Value, exponent: Value) -> Value:
     """A power: exact if both numbers are and it is short; nan if it is no real number."""
     both = isinstance(exponent, int) and not isinstance(base, float) and base != 0
-    if both and digits(base) * abs(exponent) <= EXACT_DIGITS:
+    if both and digits(base) * abs(int(exponent)) <= EXACT_DIGITS:
         return Fraction(base) ** int(exponent)
     try:
         value: float | complex = float(base) ** float(exponent)

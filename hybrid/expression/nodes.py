@@ -5,8 +5,8 @@ value that a function uses twice is one node with two uses, and two functions th
 
 Arithmetic is simplified as it is written down, locally and in time that grows with the number of terms:
 numbers are added up, equal terms and factors are collected. Nothing is expanded: ``3*(a - b)`` does not
-become ``3*a - 3*b``, which rounds where ``a - b`` is exact. Only a factor -1 goes into a sum, where it changes
-no rounding.
+become ``3*a - 3*b``, which rounds where ``a - b`` is exact. Only a factor -1 goes into a sum, where it
+changes no rounding.
 """
 
 # ruff: noqa: D102 - methods that override others are explained there

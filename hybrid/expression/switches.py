@@ -135,8 +135,8 @@ class Surfaces:
             given = [(self.known[other].height, side) for other, side in nearest.items()]
             surface = self.known[number]
             side = self._by_parallels(surface, nearest)
-            follows = (each for each in (1, -1) if follows(surface.height, each, given))
-            self._implied[key] = side or next(follows, None)
+            found = (each for each in (1, -1) if follows(surface.height, each, given))
+            self._implied[key] = side or next(found, None)
         return self._implied[key]
 
     def _nearest(self, number: int, sides: Mapping[int, int]) -> dict[int, int]:

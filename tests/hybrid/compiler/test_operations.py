@@ -16,7 +16,7 @@ from hybrid.compiler.cache.store import models_folder
 from hybrid.compiler.compiled import emitted_of
 from hybrid.compiler.emit import emit
 from hybrid.compiler.operations import operations_of
-from hybrid.expression.ranges import RULES
+from hybrid.expression.ufuncs import RULES
 from hybrid.expression.values import UFUNCS, WHERE
 
 MODELS = [
