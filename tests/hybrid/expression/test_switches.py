@@ -17,6 +17,7 @@ from hybrid.expression.switches import (
     _without_truths,
     switching_names,
 )
+from hybrid.expression.text import text
 from hybrid.expression.tracing import model_symbols, trace
 
 SYMBOLS = model_symbols(2, 1)
@@ -135,7 +136,7 @@ def test_surfaces_that_are_too_long_to_be_expanded():
     surfaces = Surfaces(SYMBOLS)
     long = Q * add(*(Sin(k * V) for k in range(1, MOST_TERMS)))
     first, orientation = surfaces.find(long)
-    assert (orientation, surfaces.known[first].level, surfaces.known[first].core) == (1, 0.0, str(long))
+    assert (orientation, surfaces.known[first].level, surfaces.known[first].core) == (1, 0.0, text(long))
     assert surfaces.find(long) == (first, 1)
     assert surfaces.find(-long)[0] != first
     other, _ = surfaces.find(Q + 1)
