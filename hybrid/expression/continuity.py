@@ -18,7 +18,6 @@ from hybrid.expression.derivatives import derivative
 from hybrid.expression.graph import (
     MOST_EXPANDED,
     contains,
-    factors_of,
     in_order,
     is_larger_than,
     mentions,
@@ -118,7 +117,7 @@ def _is_continuous(entry: Expression, atom: Expression, names: Mapping[Expressio
                 together.append((other, other_sides if ratio > 0 else other_sides[::-1]))
     together.append((atom, sides))
     ours = {each for each, _ in together}
-    bare = _replaced(surface, {}, names)
+    bare = _substituted(surface, names)
     for old, new in _substitutions(bare):
         # The values of some other atoms are known where this atom jumps: q < 1 holds where q = 0.
         known = {
@@ -127,10 +126,12 @@ def _is_continuous(entry: Expression, atom: Expression, names: Mapping[Expressio
             if other not in ours and (side := _known_side(other, names, old, new)) is not None
         }
         below, above = (
-            _without_choices(_replaced(entry, known | {each: pair[side] for each, pair in together}, names))
+            _without_choices(
+                _substituted(entry, {**names, **known, **{each: pair[side] for each, pair in together}})
+            )
             for side in (0, 1)
         )
-        if _is_zero(_substituted(above - below, old, new)):
+        if _is_zero(_substituted(above - below, {old: new})):
             return True
     return False
 
@@ -139,7 +140,7 @@ def vanishes_on(expression: Expression, surface: Expression) -> bool:
     """Whether an expression is proved to be zero wherever another one is."""
     if _is_zero(expression):
         return True
-    return any(_is_zero(_substituted(expression, old, new)) for old, new in _substitutions(surface))
+    return any(_is_zero(_substituted(expression, {old: new})) for old, new in _substitutions(surface))
 
 
 def _substitutions(surface: Expression) -> Iterator[tuple[Expression, Expression]]:
@@ -153,8 +154,7 @@ def _substitutions(surface: Expression) -> Iterator[tuple[Expression, Expression
     for term in terms_of(surface):
         if not (term.is_number or term.is_symbol):
             coefficient, product = split(term)
-            first, *others = factors_of(product)
-            yield first, (product - surface / coefficient) / multiply(*others)
+            yield product, product - surface / coefficient
 
 
 def _known_side(
@@ -168,7 +168,7 @@ def _known_side(
         return None
     surface, sides = _sides(atom, STEP)
     assert surface is not None, "the kinds of atoms that remain have a surface"
-    height = expanded(_substituted(_replaced(surface, {}, names), old, new))
+    height = expanded(_substituted(_substituted(surface, names), {old: new}))
     if not height.is_number or not abs(height.value) > 0:
         return None
     return sides[1] if height.value > 0 else sides[0]
@@ -198,9 +198,9 @@ def _sides(atom: Expression, step: Expression) -> tuple[Expression | None, tuple
     return None, nothing
 
 
-def _substituted(expression: Expression, old: Expression, new: Expression) -> Expression:
-    """The expression with another in the place of a part, and without whole turns of harmonics."""
-    found = {old: new}
+def _substituted(expression: Expression, values: Mapping[Any, Expression]) -> Expression:
+    """The expression with others in the place of some parts, and without whole turns of harmonics."""
+    found: dict[Expression, Expression] = dict(values)
     for node in in_order([expression]):
         if node not in found:
             args = [found[each] for each in node.args]
@@ -234,15 +234,6 @@ def _ratio(one: Expression, other: Expression) -> float:
     """The ratio of two expressions if it is constant, else 0."""
     found = ratio(one, other)
     return 0.0 if found is None or not math.isfinite(found.value) else float(found)
-
-
-def _replaced(
-    expression: Expression,
-    values: Mapping[Expression, Expression],
-    names: Mapping[Expression, Symbol],
-) -> Expression:
-    """The expression with values for some atoms, and symbols for all other atoms."""
-    return replaced(expression, {**names, **values})
 
 
 @once

@@ -20,7 +20,10 @@ def exact(value: Value) -> Value:
         value = Fraction(value)
     fraction = Fraction(value)
     if max(abs(fraction.numerator), fraction.denominator).bit_length() > EXACT_DIGITS:
-        return float(fraction)
+        try:
+            return float(fraction)
+        except OverflowError:
+            return math.inf if fraction > 0 else -math.inf
     return fraction.numerator if fraction.denominator == 1 else fraction
 
 

@@ -406,11 +406,12 @@ def split(term: Expression) -> tuple[Any, Expression]:
 
 def _times(factor: Any, rest: Expression) -> Expression:
     """A term: a number times what has no number as a factor."""
-    if factor == 1:
+    number = Number(factor)
+    if number is ONE:
         return rest
-    if rest.is_sum and factor == -1:
+    if rest.is_sum and number is MINUS_ONE:
         return _negative(rest)
-    return _kept(Product, Number(factor), *(rest.args if rest.is_product else (rest,)))
+    return _kept(Product, number, *(rest.args if rest.is_product else (rest,)))
 
 
 def _negative(total: Expression) -> Expression:
@@ -423,25 +424,33 @@ def _negative(total: Expression) -> Expression:
 
 
 def multiply(*factors: Expression) -> Expression:
-    """The product of factors, with the powers of equal bases collected, and those of e."""
+    """The product of factors, with the powers of equal bases collected, and those of e.
+
+    Numbers and powers are collected as long as they cannot leave the range of floats.
+    """
     coefficient: Any = 1
     found: dict[Expression, Any] = {}
     exponential: Expression | None = None
+    is_high, most = False, MOST_DIGITS
     for factor in factors:
         for each in factor.args if factor.is_product else (factor,):
+            if each is ZERO:
+                return ZERO
             if each.is_number:
-                coefficient = coefficient * each.value
+                coefficient, most = exact(coefficient * each.value), max(most, digits(each.value))
             elif each.is_exponential:
-                exponential = (
-                    each if exponential is None else each.rebuilt([exponential.args[0] + each.args[0]])
-                )
+                args = each.args if exponential is None else [exponential.args[0] + each.args[0]]
+                exponential = each.rebuilt(args)
             else:
                 base, exponent = each, 1
                 if each.is_power and each.exponent.is_number:
                     base, exponent = each.base, each.exponent.value
                 found[base] = found[base] + exponent if base in found else exponent
-    if coefficient == 0:
-        return ZERO
+                is_high = is_high or abs(found[base]) > max(HIGHEST_SPLIT, abs(exponent))
+    is_high = is_high and (len(found) > 1 or coefficient != 1)
+    if found and (is_high or coefficient == 0 or digits(coefficient) > most):
+        parts = sorted((each for each in factors if each is not ONE), key=order_of)
+        return _kept(Product, *sorted(parts, key=lambda part: not part.is_number))
     parts = [base if e == 1 else power(base, Number(e)) for base, e in found.items() if e != 0]
     if exponential is not None:
         parts.append(exponential)

@@ -367,7 +367,10 @@ class Absolute(RealFunction):
     slopes = (lambda u: Sign(u),)
 
     def raised(self, exponent: Number) -> Expression | None:
-        return power(self.args[0], exponent) if exponent.is_whole and exponent.value % 2 == 0 else None
+        if not exponent.is_whole or exponent.value == 1:
+            return None
+        odd = exponent.value % 2
+        return power(self.args[0], exponent - odd) * (self if odd else ONE)
 
 
 class Extreme(RealFunction):
@@ -455,7 +458,7 @@ class Select(RealFunction):
     """``a`` where the condition holds, else ``b``."""
 
     word = "where"
-    numpy, bounds, range = np.where, op.SELECT, staticmethod(either)
+    numpy, bounds, range = staticmethod(np.where), op.SELECT, staticmethod(either)
 
     @classmethod
     def simplified(cls, *args: Expression) -> Expression | None:

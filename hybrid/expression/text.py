@@ -57,7 +57,7 @@ class _Writer:
             else:
                 above.append(self.text(factor, PRODUCT if not below and not above else POWER))
         size, sign = abs(coefficient), "-" if coefficient < 0 else ""
-        if isinstance(size, Fraction):
+        if isinstance(size, Fraction) and (size.numerator == 1 or not _is_binary(size)):
             below.insert(0, str(size.denominator))
             size = size.numerator
         if size != 1 or not above:
@@ -78,7 +78,14 @@ class _Writer:
         return f"{self.text(base, ATOM)}**{self.text(exponent, ATOM)}", POWER
 
 
+def _is_binary(value: Fraction) -> bool:
+    """Whether a fraction has few decimals."""
+    return value.denominator & (value.denominator - 1) == 0
+
+
 def _number(value: int | Fraction | float) -> tuple[str, int]:
+    if isinstance(value, Fraction) and _is_binary(value):
+        value = float(value)
     if isinstance(value, Fraction):
         shown = f"{value.numerator}/{value.denominator}"
         binding = PRODUCT

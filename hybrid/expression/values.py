@@ -21,6 +21,8 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from hybrid.errors import ModelError, shown
 from hybrid.expression.branches import refused_branch
+from hybrid.expression.nodes import Expression
+from hybrid.expression.text import text
 from hybrid.system.variables import PARAMETERS, STATE, named_values
 
 # NumPy's universal functions that can be traced; ``hybrid.expression.ufuncs`` has a rule for each.
@@ -222,7 +224,8 @@ class Traced(NDArrayOperatorsMixin):
         return repr(self)
 
     def __repr__(self) -> str:
-        return f"Traced({self.expression})"
+        found = self.expression
+        return f"Traced({text(found) if isinstance(found, Expression) else found})"
 
 
 class TracedArray(np.ndarray):

@@ -13,7 +13,7 @@ from typing import ClassVar
 
 from hybrid.compiler.bounds.forcing import is_harmless
 from hybrid.compiler.emitted import Programs
-from hybrid.expression.graph import is_negative, is_whole
+from hybrid.expression.graph import is_negative
 from hybrid.expression.nodes import HALF, Expression, Number, Product, Sum
 from hybrid.expression.operations import Remainder, Several, TruncatedRemainder
 from hybrid.expression.tracing import Symbols
@@ -142,8 +142,6 @@ class _Writer:
 
     def _power(self, base: Expression, exponent: Expression) -> int:
         a = self.place(base)
-        if is_whole(exponent):
-            return self._add(op.WHOLE_POWER, a, int(exponent.value))
         if exponent is HALF:
             return self._add(op.SQRT, a)
         if exponent.is_number:
