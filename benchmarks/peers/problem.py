@@ -10,7 +10,8 @@ import numpy as np
 import sympy
 
 from hybrid import Answer, HybridSystem
-from hybrid.expression import expressions as sym
+from hybrid.expression.graph import in_order
+from hybrid.expression.nodes import Expression
 from hybrid.expression.tracing import model_symbols, trace
 
 # Ratio of absolute to relative tolerance, the same for all.
@@ -97,10 +98,11 @@ def equations(system: HybridSystem) -> Equations:
     """The equations of a model as plain SymPy."""
     names = tuple(system.parameters)
     symbols = model_symbols(system.dimension, len(names))
-    values = dict(zip(symbols.p, map(sympy.Float, system.parameter_values()), strict=True))
+    known: dict[Expression, sympy.Expr] = {x: sympy.Symbol(x.label, real=True) for x in symbols.variables}
+    known |= zip(symbols.p, map(sympy.Float, system.parameter_values()), strict=True)
 
     def expressions(function: Callable[..., Any]) -> tuple[sympy.Expr, ...]:
-        return tuple(_plain(e.subs(values)) for e in trace(function, system.state, names))
+        return tuple(_in_sympy(e, known) for e in trace(function, system.state, names))
 
     exits = tuple(
         tuple(
@@ -116,21 +118,37 @@ def equations(system: HybridSystem) -> Equations:
         for mode in system.mode_names
     )
     fields = tuple(expressions(mode.field) for mode in system.modes)
-    return Equations(symbols.t, symbols.x, fields, exits)
+    return Equations(known[symbols.t], tuple(known[x] for x in symbols.x), fields, exits)
 
 
-def _plain(expression: sympy.Expr) -> sympy.Expr:
-    """Replace the library's choices and kinks by SymPy's own functions, which SymPy's printers support."""
-    for ours, theirs in (
-        (sym.Maximum, sympy.Max),
-        (sym.Absolute, sympy.Abs),
-        (sym.Sign, sympy.sign),
-        (sym.Remainder, sympy.Mod),
-        (sym.Less, lambda a, b: sympy.Piecewise((1, a < b), (0, True))),
-        (sym.Select, lambda condition, a, b: sympy.Piecewise((a, condition > 0), (b, True))),
-    ):
-        expression = expression.replace(ours, theirs)
-    return expression
+# Functions that SymPy has under other names; the others have its names.
+THEIRS = {
+    "Arccos": sympy.acos,
+    "Arcsin": sympy.asin,
+    "Arctan": sympy.atan,
+    "Maximum": sympy.Max,
+    "Minimum": sympy.Min,
+    "Absolute": sympy.Abs,
+    "Sign": sympy.sign,
+    "Remainder": sympy.Mod,
+    "Less": lambda a, b: sympy.Piecewise((1, a < b), (0, True)),
+    "Select": lambda condition, a, b: sympy.Piecewise((a, condition > 0), (b, True)),
+    "Sum": sympy.Add,
+    "Product": sympy.Mul,
+    "Power": sympy.Pow,
+}
+
+
+def _in_sympy(expression: Expression, known: dict[Expression, sympy.Expr]) -> sympy.Expr:
+    """An expression in SymPy's functions, which its printers support."""
+    for node in in_order([expression]):
+        if node.is_number:
+            known[node] = sympy.sympify(node.value)
+        elif node not in known:
+            name = type(node).__name__
+            function = THEIRS.get(name) or getattr(sympy, name.lower())
+            known[node] = function(*(known[each] for each in node.args))
+    return known[expression]
 
 
 def compiled(expressions: Sequence[sympy.Expr]) -> Callable[[float, np.ndarray, np.ndarray], None]:

@@ -102,7 +102,7 @@ def variational(field: Written, n: int) -> list[str]:
         local = [CELL.sub(r"a\1_\2", statement) for statement in field.derivative]
         lines = [*field.value, *local]
     else:
-        entry = {(i, j): name for (i, j), name in entry.items() if field.jacobian[i][j] != 0}
+        entry = {(i, j): name for (i, j), name in entry.items() if field.jacobian[i][j] is not ZERO}
         targets = [*(f"out[{i}]" for i in range(n)), *entry.values()]
         lines = assignments(targets, [*field.expressions, *(field.jacobian[i][j] for i, j in entry)])
     lines.append(f"for v in range({n}, len(x), {n}):")

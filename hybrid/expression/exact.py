@@ -14,6 +14,8 @@ LARGEST_EXACT = 2.0**50
 
 def exact(value: Value) -> Value:
     """A number as it is kept: exact if it is short, and a whole number if it is one."""
+    if type(value) is int and -LARGEST_EXACT < value < LARGEST_EXACT:
+        return value
     if isinstance(value, float):
         if not (abs(value) < LARGEST_EXACT and (8.0 * value).is_integer()):
             return float(value)

@@ -431,13 +431,13 @@ def multiply(*factors: Expression) -> Expression:
     coefficient: Any = 1
     found: dict[Expression, Any] = {}
     exponential: Expression | None = None
-    is_high, most = False, MOST_DIGITS
+    is_high = False
     for factor in factors:
         for each in factor.args if factor.is_product else (factor,):
             if each is ZERO:
                 return ZERO
             if each.is_number:
-                coefficient, most = exact(coefficient * each.value), max(most, digits(each.value))
+                coefficient = exact(coefficient * each.value)
             elif each.is_exponential:
                 args = each.args if exponential is None else [exponential.args[0] + each.args[0]]
                 exponential = each.rebuilt(args)
@@ -448,7 +448,7 @@ def multiply(*factors: Expression) -> Expression:
                 found[base] = found[base] + exponent if base in found else exponent
                 is_high = is_high or abs(found[base]) > max(HIGHEST_SPLIT, abs(exponent))
     is_high = is_high and (len(found) > 1 or coefficient != 1)
-    if found and (is_high or coefficient == 0 or digits(coefficient) > most):
+    if found and (is_high or _is_out_of_range(coefficient, factors)):
         parts = sorted((each for each in factors if each is not ONE), key=order_of)
         return _kept(Product, *sorted(parts, key=lambda part: not part.is_number))
     parts = [base if e == 1 else power(base, Number(e)) for base, e in found.items() if e != 0]
@@ -461,6 +461,19 @@ def multiply(*factors: Expression) -> Expression:
         return _times(leading.value, parts[0]) if parts else leading
     parts.sort(key=order_of)
     return _kept(Product, *(parts if leading is ONE else [leading, *parts]))
+
+
+def _is_out_of_range(coefficient: Any, factors: Sequence[Expression]) -> bool:
+    """Whether a product of numbers is far larger or smaller than each of them."""
+    if coefficient == 0:
+        return True
+    size = digits(coefficient)
+    return size > MOST_DIGITS and all(
+        size > digits(each.value)
+        for factor in factors
+        for each in (factor.args if factor.is_product else (factor,))
+        if each.is_number
+    )
 
 
 def power(base: Expression, exponent: Expression) -> Expression:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Iterable
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import attrs
 
 from hybrid.errors import ModelError
-from hybrid.expression.graph import is_larger_than, nodes
+from hybrid.expression.graph import Group, is_larger_than, nodes
 from hybrid.expression.nodes import Expression, Number, Symbol, number
 from hybrid.expression.text import text
 from hybrid.expression.ufuncs import RULES
@@ -59,20 +59,20 @@ class Symbols:
     """The symbols of a traced function, with the names they have in generated code."""
 
     t: Symbol
-    x: tuple[Symbol, ...]
-    p: tuple[Symbol, ...]
+    x: Group
+    p: Group
 
-    @property
-    def variables(self) -> tuple[Symbol, ...]:
+    @cached_property
+    def variables(self) -> Group:
         """The columns of a derivative: the states, then time."""
-        return (*self.x, self.t)
+        return Group((*self.x, self.t))
 
 
 @lru_cache(maxsize=1000)
 def model_symbols(n: int, m: int) -> Symbols:
     """Real symbols ``t``, ``x[0] ... x[n-1]`` and ``p[0] ... p[m-1]``."""
-    x = tuple(Symbol(f"x[{i}]") for i in range(n))
-    p = tuple(Symbol(f"p[{i}]") for i in range(m))
+    x = Group(Symbol(f"x[{i}]") for i in range(n))
+    p = Group(Symbol(f"p[{i}]") for i in range(m))
     return Symbols(Symbol("t"), x, p)
 
 

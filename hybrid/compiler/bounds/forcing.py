@@ -17,6 +17,7 @@ import attrs
 from hybrid.compiler.taylor.roots import is_multiple
 from hybrid.expression.continuity import ROUNDING
 from hybrid.expression.graph import (
+    Group,
     degree_of,
     factors_of,
     is_negative,
@@ -112,17 +113,18 @@ class Times:
         The other components.
     """
 
-    passing: tuple[Symbol, ...]
-    all: tuple[Symbol, ...]
-    state: tuple[Symbol, ...]
+    passing: Group
+    all: Group
+    state: Group
 
 
 def times_of(field: Sequence[Expression], symbols: Symbols) -> Times:
     """The components of the state that tell the time in the mode of a field, and the others."""
     constant = [not mentions(rate, symbols.variables) for rate in field]
-    clocks = tuple(x for x, same in zip(symbols.x, constant, strict=True) if same)
-    passing = tuple(x for x, rate in zip(symbols.x, field, strict=True) if x in clocks and rate != 0)
-    return Times((symbols.t, *passing), (symbols.t, *clocks), tuple(x for x in symbols.x if x not in clocks))
+    clocks = [x for x, same in zip(symbols.x, constant, strict=True) if same]
+    passing = [x for x, rate in zip(symbols.x, field, strict=True) if x in clocks and rate is not ZERO]
+    state = Group(x for x, same in zip(symbols.x, constant, strict=True) if not same)
+    return Times(Group((symbols.t, *passing)), Group((symbols.t, *clocks)), state)
 
 
 def forcings(

@@ -8,7 +8,7 @@ from hybrid.compiler.emitted import Propagator
 from hybrid.compiler.propagators.equations import Equations, columns_of_guards
 from hybrid.compiler.propagators.writing import write_series
 from hybrid.expression.graph import degree_of
-from hybrid.expression.nodes import Expression
+from hybrid.expression.nodes import ZERO, Expression
 from hybrid.expression.tracing import Symbols
 from hybrid.kernels.types.codes import EXACT, HIGHEST_ORDER
 
@@ -46,11 +46,11 @@ def _degree(field: Sequence[Expression], jacobian: Sequence[Sequence[Expression]
     acts_on: list[list[int]] = [[] for _ in field]
     waiting = []
     for i, row in enumerate(jacobian):
-        sources = [j for j, entry in enumerate(row) if entry != 0]
+        sources = [j for j, entry in enumerate(row) if entry is not ZERO]
         waiting.append(len(sources))
         for j in sources:
             acts_on[j].append(i)
-    degrees = [0 if entry == 0 else 1 + (known or 0) for entry, known in zip(field, forcing, strict=True)]
+    degrees = [0 if entry is ZERO else 1 + (known or 0) for entry, known in zip(field, forcing, strict=True)]
     ready = [i for i, count in enumerate(waiting) if count == 0]
     for j in ready:
         for i in acts_on[j]:

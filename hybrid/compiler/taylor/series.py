@@ -16,7 +16,15 @@ from hybrid.compiler.taylor.sums import Term, added
 from hybrid.expression.code import power_text
 from hybrid.expression.constants import Constants
 from hybrid.expression.derivatives import derivative
-from hybrid.expression.graph import factors_of, is_negative, is_whole, mentions, nodes, symbols_of, terms_of
+from hybrid.expression.graph import (
+    Group,
+    factors_of,
+    is_negative,
+    is_whole,
+    mentions,
+    nodes,
+    terms_of,
+)
 from hybrid.expression.nodes import ONE, TWO, ZERO, Expression, Symbol, add, multiply, number, power
 from hybrid.expression.operations import (
     Arccos,
@@ -125,9 +133,8 @@ class Recurrences:
         self.shared: Counter[Expression] = Counter()
         self.lateness: dict[Expression, int] = {}
         self.readiness: dict[Expression, tuple[int, int]] = {}
-        self.own = frozenset(rows)
-        if known is None and time is not None:
-            self.own |= {time[0]}
+        moving = [] if known is not None or time is None else [time[0]]
+        self.own = Group((*rows, *moving))
 
     def expect(self, symbols: Iterable[Symbol | None], rates: Sequence[Expression]) -> None:
         """Analyse the rates of symbols before their recurrences are written.
@@ -420,7 +427,7 @@ class Recurrences:
         """The constant rate of an argument that is linear in time; None for other arguments."""
         if self.time is None or self.time[1] != ONE_THEN_ZERO:
             return None
-        if symbols_of(u) & self.own - {self.time[0]}:
+        if mentions(u, [each for each in self.own if each is not self.time[0]]):
             return None
         slope = derivative(u, self.time[0])
         return self.constants.name(slope) if self._is_constant(slope) else None
