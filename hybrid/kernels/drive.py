@@ -10,8 +10,8 @@ from hybrid.kernels.events.guards import (
     rounding_band,
 )
 from hybrid.kernels.limit.go import may_accumulate
-from hybrid.kernels.steps.disguised_jumps import leave
-from hybrid.kernels.steps.late import is_late
+from hybrid.kernels.steps.field.jumps import leave
+from hybrid.kernels.steps.field.late import is_late
 from hybrid.kernels.steps.series import series_step
 from hybrid.kernels.types.codes import (
     ACCUMULATION,

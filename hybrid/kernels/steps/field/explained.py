@@ -1,0 +1,178 @@
+"""The longest step on which no pulse of the field is hidden from the method.
+
+Error control cannot see a pulse between the places at which a method looks. So each part of the field that
+depends on time alone is bounded over the step before it is taken. A component of the state that grows at a
+constant rate tells the time as well.
+
+Parts that may be flat and have a pulse in the state, such as a narrow bump of a potential or a contact that
+the orbit meets for a moment, are bounded over the series, or over the interpolant of an attempted step.
+"""
+
+import math
+
+from numba import njit
+
+from hybrid.kernels.arithmetic.clock import measured_time
+from hybrid.kernels.events.guards import has_program, has_terms_in_state
+from hybrid.kernels.events.path import up_to
+from hybrid.kernels.steps.field.pulses import Demand, Samples, first_hidden
+from hybrid.kernels.steps.field.residual import follows_field, is_finite
+from hybrid.kernels.steps.step import combine, interpolant_path, path_of_step
+from hybrid.kernels.types.codes import ARGUMENTS, HIGH, IN_TIME, LOW, TERMS
+from hybrid.kernels.types.kinds import INTEGER, REAL
+from hybrid.kernels.types.layout import EPSILON, Method, Model, Path, Run, Work
+from hybrid.kernels.types.options import KERNEL, exported
+
+# More than so many tolerances of a forcing that are as short as the rounding of time, or that are rounding,
+# are reported.
+COARSE = 10.0
+# Shortest step, in units of the rounding of time: the places at which a method looks are apart.
+FINEST = 64.0 * EPSILON
+# After this many such steps the forcing is no longer tested: a run does not crawl where bounds say nothing.
+MOST_UNRESOLVED = 100
+# Most attempts to shorten a step; one that halves the step reaches its rounding sooner.
+MOST_CUTS = 200
+# An exponential whose argument changes by no more than this is not small to all digits where it matters.
+MOST_CHANGE = 8.0
+
+
+@njit(**KERNEL)
+def _arguments_change(model, mode, path, work):
+    """Whether an argument of the exponentials in the state changes so much that a step may hide a pulse.
+
+    If not, the exponential is not so small anywhere on the step that its series does not show it.
+    """
+    if not has_terms_in_state(model, mode):
+        return False
+    forcing = model.first_forcing[mode]
+    while model.forcing_kind[forcing] != ARGUMENTS:
+        forcing += 1
+    program = model.target.shape[0] + forcing
+    if not has_program(model, program):
+        return True
+    first, half = model.programs.first[program], 0.5 * path.length
+    last = model.bound(model.programs, program, path, half, half, work.registers)
+    for row in range(last + 1):
+        change = work.registers[row, HIGH] - work.registers[row, LOW]
+        if model.programs.checked[first + row] == 1 and not change <= MOST_CHANGE:
+            return True
+    return False
+
+
+@njit(**KERNEL)
+def _first_unexplained(model, method, run, path, at, kind, finest, work):
+    """``first_hidden`` over all forcings of a kind, and whether what rounding hides has to be reported."""
+    h = path.length
+    explained, beyond, coarse = h, h, False
+    for forcing in range(model.first_forcing[run.mode], model.first_forcing[run.mode + 1]):
+        program, component = model.target.shape[0] + forcing, model.forcing_component[forcing]
+        if model.forcing_kind[forcing] != kind or not has_program(model, program):
+            continue
+        tolerance = 0.0
+        if component >= 0:
+            tolerance = (method.atol + method.rtol * abs(run.y[component])) / path.pace
+        demand = Demand(tolerance, finest, kind == TERMS)
+        place, other, rest = first_hidden(model, program, up_to(path, explained), at, demand, work)
+        coarse = coarse or (kind == IN_TIME and rest > COARSE * tolerance)
+        if place < explained:
+            explained, beyond, at = place, other, Samples(at.nodes, False)
+    return explained, beyond, coarse
+
+
+@njit(**KERNEL)
+def _longest_explained(model, method, run, path, at, kind, work):
+    """The longest part of a path on which the forcings of a kind are explained, down to rounding.
+
+    A step is cut to where it is explained. If that is hardly anything, the pulse has begun, and a step as far
+    as its first place that is not explained has the length of the pulse.
+    """
+    h = path.length
+    rounding = 0.0 if path.clock >= 0 else measured_time(model, run, run.mode) / path.pace
+    shortest = FINEST * rounding + EPSILON * h
+    for _ in range(MOST_CUTS):
+        finest = 2.0 * EPSILON * (rounding + h)
+        part = up_to(path, h)
+        explained, beyond, coarse = _first_unexplained(model, method, run, part, at, kind, finest, work)
+        if explained >= h:
+            run.coarse += 1 if coarse else 0
+            return h
+        h, at = explained if 2.0 * explained >= beyond else beyond, Samples(at.nodes, False)
+        if not h > shortest:
+            break
+    return _unresolved(run, path.length, max(h, shortest))
+
+
+@njit(**KERNEL)
+def _unresolved(run, longest, shortest):
+    """The step if no step is explained: the shortest one; after many such steps, the proposed one."""
+    run.unresolved += 1
+    return min(longest, shortest) if run.unresolved <= MOST_UNRESOLVED else longest
+
+
+@exported(REAL, Model, Method, Run, REAL, Work)
+def explained_step(model, method, run, h, work):
+    """The length up to ``h`` of a step whose stages explain the forcing.
+
+    The components that tell the time grow at a constant rate. ``work.stages[0]`` holds the rates.
+    """
+    for i in range(model.dimension):
+        work.path[0, i], work.path[1, i] = run.y[i], work.stages[0, i]
+    path = Path(work.path, 1, -1, run.phase, 1.0, h, False)
+    return _longest_explained(model, method, run, path, Samples(method.nodes, False), IN_TIME, work)
+
+
+@njit(**KERNEL)
+def _keep_places(model, method, run, h, work):
+    """The states at which an explicit method has evaluated the field of the attempted step, by its nodes.
+
+    They are farther from the solution than the interpolant: what lies there may be hidden from the method.
+    The stages of the interpolant alone come last.
+    """
+    n, s, places, count = model.dimension, method.b.shape[0], work.places, len(method.nodes)
+    for j in range(count - 1):
+        for i in range(s):
+            if method.c[i] == method.nodes[j]:
+                combine(run.y, h, method.a[i], work.stages, i, n, places[j])
+    for i in range(n):
+        places[count - 1, i] = work.new[i]
+    for i in range(s + 1, method.a.shape[0]):
+        place = places[count + i - s - 1]
+        combine(run.y, h, method.a[i], work.stages, i, n, place)
+        place[n] = method.c[i]
+
+
+@exported(REAL, Model, Method, Run, REAL, Work)
+def explained_attempt(model, method, run, h, work):
+    """The length up to ``h`` of a step on which no pulse in the state is hidden from the attempted one.
+
+    The interpolant of the attempted step, whose stages are those of ``work``, is the way between its ends.
+    """
+    interpolant_path(method, h, run.y, model.dimension, work)
+    path, explicit = path_of_step(method, run.phase, h, work), method.implicit == 0
+    if not _arguments_change(model, run.mode, path, work):
+        return h
+    if explicit:
+        _keep_places(model, method, run, h, work)
+    return h * _longest_explained(model, method, run, path, Samples(method.nodes, explicit), TERMS, work)
+
+
+@exported(REAL, Model, Method, Run, INTEGER, Path, Work)
+def explained_series(model, method, run, tangents, path, work):
+    """The length of the step on which a path of series follows the forcing; nan if it is not finite."""
+    h, at = path.length, Samples(method.series_nodes, False)
+    if not is_finite(model, run.mode, tangents, path, work):
+        return math.nan
+    shortest = EPSILON * h + (0.0 if path.clock >= 0 else FINEST * measured_time(model, run, run.mode))
+    for _ in range(MOST_CUTS):
+        h = timed = _longest_explained(model, method, run, up_to(path, h), at, IN_TIME, work)
+        if _arguments_change(model, run.mode, up_to(path, h), work):
+            h = _longest_explained(model, method, run, up_to(path, h), at, TERMS, work)
+        if shortest < h < timed:
+            # On a shorter step, the forcing in time has other places to be explained by.
+            continue
+        if follows_field(model, method, run, tangents, up_to(path, h), work):
+            return h
+        h *= 0.5
+        if not h > shortest:
+            break
+    return _unresolved(run, path.length, h)
