@@ -15,7 +15,7 @@ from numba import njit
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.events.guards import has_program, has_terms_in_state
 from hybrid.kernels.events.path import up_to
-from hybrid.kernels.steps.field.pulses import Demand, Samples, first_hidden
+from hybrid.kernels.steps.field.pulses import Asked, first_hidden
 from hybrid.kernels.steps.field.residual import follows_field, is_finite
 from hybrid.kernels.steps.step import combine, interpolant_path, path_of_step
 from hybrid.kernels.types.codes import ARGUMENTS, HIGH, IN_TIME, LOW, TERMS
@@ -60,43 +60,34 @@ def _arguments_change(model, mode, path, work):
 
 
 @njit(**KERNEL)
-def _first_unexplained(model, method, run, path, at, kind, finest, work):
-    """``first_hidden`` over all forcings of a kind, and whether what rounding hides has to be reported."""
-    h = path.length
-    explained, beyond, coarse = h, h, False
-    for forcing in range(model.first_forcing[run.mode], model.first_forcing[run.mode + 1]):
-        program, component = model.target.shape[0] + forcing, model.forcing_component[forcing]
-        if model.forcing_kind[forcing] != kind or not has_program(model, program):
-            continue
-        tolerance = 0.0
-        if component >= 0:
-            tolerance = (method.atol + method.rtol * abs(run.y[component])) / path.pace
-        demand = Demand(tolerance, finest, kind == TERMS)
-        place, other, rest = first_hidden(model, program, up_to(path, explained), at, demand, work)
-        coarse = coarse or (kind == IN_TIME and rest > COARSE * tolerance)
-        if place < explained:
-            explained, beyond, at = place, other, Samples(at.nodes, False)
-    return explained, beyond, coarse
-
-
-@njit(**KERNEL)
-def _longest_explained(model, method, run, path, at, kind, work):
+def _longest_explained(model, method, run, path, nodes, kind, seen, work):
     """The longest part of a path on which the forcings of a kind are explained, down to rounding.
 
     A step is cut to where it is explained. If that is hardly anything, the pulse has begun, and a step as far
     as its first place that is not explained has the length of the pulse.
     """
-    h = path.length
-    rounding = 0.0 if path.clock >= 0 else measured_time(model, run, run.mode) / path.pace
+    h, mode = path.length, run.mode
+    rounding = 0.0 if path.clock >= 0 else measured_time(model, run, mode) / path.pace
     shortest = FINEST * rounding + EPSILON * h
     for _ in range(MOST_CUTS):
         finest = 2.0 * EPSILON * (rounding + h)
-        part = up_to(path, h)
-        explained, beyond, coarse = _first_unexplained(model, method, run, part, at, kind, finest, work)
+        explained, beyond, coarse = h, h, False
+        for forcing in range(model.first_forcing[mode], model.first_forcing[mode + 1]):
+            program, component = model.target.shape[0] + forcing, model.forcing_component[forcing]
+            if model.forcing_kind[forcing] != kind or not has_program(model, program):
+                continue
+            tolerance = 0.0
+            if component >= 0:
+                tolerance = (method.atol + method.rtol * abs(run.y[component])) / path.pace
+            asked = Asked(nodes, seen and explained == path.length, tolerance, finest, kind == TERMS)
+            place, other, rest = first_hidden(model, program, up_to(path, explained), asked, work)
+            coarse = coarse or (kind == IN_TIME and rest > COARSE * tolerance)
+            if place < explained:
+                explained, beyond = place, other
         if explained >= h:
             run.coarse += 1 if coarse else 0
             return h
-        h, at = explained if 2.0 * explained >= beyond else beyond, Samples(at.nodes, False)
+        h = explained if 2.0 * explained >= beyond else beyond
         if not h > shortest:
             break
     return _unresolved(run, path.length, max(h, shortest))
@@ -118,7 +109,7 @@ def explained_step(model, method, run, h, work):
     for i in range(model.dimension):
         work.path[0, i], work.path[1, i] = run.y[i], work.stages[0, i]
     path = Path(work.path, 1, -1, run.phase, 1.0, h, False)
-    return _longest_explained(model, method, run, path, Samples(method.nodes, False), IN_TIME, work)
+    return _longest_explained(model, method, run, path, method.nodes, IN_TIME, False, work)
 
 
 @njit(**KERNEL)
@@ -153,20 +144,20 @@ def explained_attempt(model, method, run, h, work):
         return h
     if explicit:
         _keep_places(model, method, run, h, work)
-    return h * _longest_explained(model, method, run, path, Samples(method.nodes, explicit), TERMS, work)
+    return h * _longest_explained(model, method, run, path, method.nodes, TERMS, explicit, work)
 
 
 @exported(REAL, Model, Method, Run, INTEGER, Path, Work)
 def explained_series(model, method, run, tangents, path, work):
     """The length of the step on which a path of series follows the forcing; nan if it is not finite."""
-    h, at = path.length, Samples(method.series_nodes, False)
+    h, nodes = path.length, method.series_nodes
     if not is_finite(model, run.mode, tangents, path, work):
         return math.nan
     shortest = EPSILON * h + (0.0 if path.clock >= 0 else FINEST * measured_time(model, run, run.mode))
     for _ in range(MOST_CUTS):
-        h = timed = _longest_explained(model, method, run, up_to(path, h), at, IN_TIME, work)
+        h = timed = _longest_explained(model, method, run, up_to(path, h), nodes, IN_TIME, False, work)
         if _arguments_change(model, run.mode, up_to(path, h), work):
-            h = _longest_explained(model, method, run, up_to(path, h), at, TERMS, work)
+            h = _longest_explained(model, method, run, up_to(path, h), nodes, TERMS, False, work)
         if shortest < h < timed:
             # On a shorter step, the forcing in time has other places to be explained by.
             continue

@@ -39,33 +39,20 @@ SHARE = 0.01
 MOST_PIECES = 80
 
 
-class Samples(NamedTuple):
-    """The places of a step, as shares of it, at which a method looks at a function.
+class Asked(NamedTuple):
+    """What is asked of an expression on a step, and where a method looks at it.
 
-    The method may have ``seen`` other states there than those of the path: these are ``work.places``.
+    ``nodes`` are shares of the step. A method may have ``seen`` other states there than those of the path,
+    which are ``work.places``. ``tolerance`` is that of the expression's integral, zero if unknown. Pieces are
+    no shorter than ``finest``. The bounds of an expression ``of_state`` may be wide: it is unexplained only
+    where the middle of a piece is certain to be.
     """
 
     nodes: VECTOR
     seen: TRUTH
-
-
-class Demand(NamedTuple):
-    """What may remain unseen of an expression on a step.
-
-    ``tolerance`` is that of its integral over the path's variable, zero if unknown. Pieces are no shorter
-    than ``finest``. The bounds of an expression ``of_state`` may be wide: it is unexplained only where the
-    middle of a piece is certain to be.
-    """
-
     tolerance: REAL
     finest: REAL
     of_state: TRUTH
-
-
-@njit(**INLINE)
-def _last_row(programs, program):
-    """The row of the expression itself, behind those of its parts."""
-    return programs.first[program + 1] - 1 - programs.first[program]
 
 
 @njit(**INLINE)
@@ -96,16 +83,16 @@ def _bound_at_stage(model, program, t, row, work):
 
 
 @njit(**KERNEL)
-def _take_samples(model, program, path, at, work):
+def _take_samples(model, program, path, asked, work):
     """Ranges of all rows at the nodes into ``work.samples``, low and high in turn.
 
     The last row takes the largest low end and the smallest high end of each.
     """
-    samples, nodes = work.samples, at.nodes
+    samples, nodes = work.samples, asked.nodes
     common = samples[samples.shape[0] - 1]
     for j in range(len(nodes)):
         place = nodes[j] * path.length
-        if at.seen:
+        if asked.seen:
             last = _bound_at_stage(model, program, time_at(path, place), j, work)
         else:
             last = model.bound(model.programs, program, path, place, 0.0, work.registers)
@@ -140,7 +127,7 @@ def _judged(programs, program, j, whole, length, tolerance, work):
     HIDDEN if its middle is certain to lie beyond what they explain. Returned second is by how much the
     expression may leave what they explain, rounding aside.
     """
-    first, last = programs.first[program], _last_row(programs, program)
+    first, last = programs.first[program], programs.first[program + 1] - 1 - programs.first[program]
     verdict, unseen = EXPLAINED, 0.0
     # The last row is the expression itself: if that is explained, or negligible, so are its parts.
     for place in range(last, -1, -1):
@@ -165,41 +152,42 @@ def _judged(programs, program, j, whole, length, tolerance, work):
 
 
 @njit(**KERNEL)
-def _hidden_from_stages(model, program, path, nodes, demand, work):
+def _hidden_from_stages(model, program, path, asked, work):
     """A pulse at a stage that only the interpolant has: the node before it and its place, or the step twice.
 
     Such a pulse bends the interpolant, which then does not show it.
     """
-    h = path.length
+    h, nodes = path.length, asked.nodes
     for k in range(len(nodes), work.places.shape[0]):
         place = work.places[k, model.dimension] * h
         _bound_at_stage(model, program, time_at(path, place), k, work)
         j = 0
         while nodes[j + 1] * h < place:
             j += 1
-        verdict, _ = _judged(model.programs, program, j, False, h, demand.tolerance, work)
+        verdict, _ = _judged(model.programs, program, j, False, h, asked.tolerance, work)
         if verdict == HIDDEN:
             return nodes[j] * h, place
     return h, h
 
 
 @njit(**KERNEL)
-def _hidden_between(model, program, path, j, demand, work):
-    """``first_hidden`` between the samples ``j`` and ``j + 1``, the ends of the interval in ``work``."""
-    stack, top, pieces, coarse = work.intervals, 0, 0, 0.0
-    last, tolerance = _last_row(model.programs, program), demand.tolerance
+def _hidden_between(model, program, path, j, asked, work):
+    """``first_hidden`` between the samples ``j`` and ``j + 1``."""
+    stack, top, pieces, coarse, tolerance = work.intervals, 0, 0, 0.0, asked.tolerance
+    stack[0, 0], stack[0, 1] = asked.nodes[j] * path.length, asked.nodes[j + 1] * path.length
     while top >= 0:
         low, high = stack[top, 0], stack[top, 1]
         middle = 0.5 * (low + high)
-        model.bound(model.programs, program, path, middle, max(high - middle, middle - low), work.registers)
+        radius = max(high - middle, middle - low)
+        last = model.bound(model.programs, program, path, middle, radius, work.registers)
         verdict, unseen = _judged(model.programs, program, j, pieces == 0, high - low, tolerance, work)
         pieces += 1
-        if verdict == UNKNOWN and high - low > demand.finest:
+        if verdict == UNKNOWN and high - low > asked.finest:
             if pieces < MOST_PIECES and top < stack.shape[0] - 1:
                 stack[top, 0], stack[top + 1, 0], stack[top + 1, 1] = middle, low, middle
                 top += 1
                 continue
-            verdict = EXPLAINED if demand.of_state else HIDDEN
+            verdict = EXPLAINED if asked.of_state else HIDDEN
         if verdict == HIDDEN:
             return low, middle, coarse
         if tolerance > 0.0:
@@ -213,25 +201,21 @@ def _hidden_between(model, program, path, j, demand, work):
 
 
 @njit(**KERNEL)
-def first_hidden(model, program, path, at, demand, work):
+def first_hidden(model, program, path, asked, work):
     """The length on which an expression is explained, of a path, and the first unexplained place after it.
 
     Both are the path's length if all of it is explained. Returned third is the most that a piece adds to the
     expression's integral, as far as bounds can tell, which rounding explains or which is as short as the
     rounding of time. It is infinite if the integral has no tolerance and much of the expression is rounding.
     """
-    h, nodes, coarse = path.length, at.nodes, 0.0
-    if _is_steady(model, program, path, demand.tolerance, work):
+    h, coarse = path.length, 0.0
+    if _is_steady(model, program, path, asked.tolerance, work):
         return h, h, 0.0
-    _take_samples(model, program, path, at, work)
-    if at.seen:
-        before, place = _hidden_from_stages(model, program, path, nodes, demand, work)
-        if place < h:
-            return before, place, 0.0
-    for j in range(len(nodes) - 1):
-        work.intervals[0, 0], work.intervals[0, 1] = nodes[j] * h, nodes[j + 1] * h
-        before, place, rest = _hidden_between(model, program, path, j, demand, work)
+    _take_samples(model, program, path, asked, work)
+    before, place = _hidden_from_stages(model, program, path, asked, work) if asked.seen else (h, h)
+    for j in range(len(asked.nodes) - 1 if place == h else 0):
+        before, place, rest = _hidden_between(model, program, path, j, asked, work)
         coarse = max(coarse, rest)
-        if before < h:
-            return before, place, coarse
-    return h, h, coarse
+        if place < h:
+            break
+    return before, place, coarse

@@ -57,30 +57,20 @@ def is_finite(model, mode, tangents, path, work):
 
 
 @njit(**KERNEL)
-def _is_beyond_guard(model, run, path, s):
-    """Whether a place on the clock of a mode lies beyond a guard in the series: the mode ends before."""
-    first = model.first_outgoing[run.mode]
-    for slot in range(first, model.first_outgoing[run.mode + 1]):
-        transition = model.outgoing[slot]
-        if model.guard_in_series[transition] == 1:
-            value, _ = _value_and_slope(path.powers, model.dimension + slot - first, path.degree, s)
-            if value * run.side[transition] < 0.0:
-                return True
-    return False
-
-
-@njit(**KERNEL)
 def _add_residual(model, run, tangents, path, s, weight, noisy, work):
     """Add to ``work.error`` what the field and the slope of a series differ by at ``s``.
 
-    With ``noisy``, what the rounding of the state makes of the field there does not count.
+    With ``noisy``, what the rounding of the state makes of the field there does not count. Nothing is added
+    where the clock of a mode runs backwards: the mode ends before.
     """
     mode, length, t, pace = run.mode, model.dimension * (1 + tangents), path.start + s, 1.0
     field, other = work.stages[0], work.stages[1]
-    _along_series(model, mode, tangents, path, s, work)
     if path.clock >= 0:
         passed, pace = _value_and_slope(path.powers, path.clock, path.degree, s)
         t = path.start + passed
+        if pace < 0.0:
+            return
+    _along_series(model, mode, tangents, path, s, work)
     rates_by_jacobian(model, mode, t, work.trial, tangents, work.jacobian, field)
     if noisy:
         for i in range(length):
@@ -98,11 +88,10 @@ def _is_small(model, method, run, tangents, work):
     """Whether the integrals of a residual in ``work.error`` are within the tolerances at the step's end."""
     n = model.dimension
     for first in range(0, n * (1 + tangents), n):
-        floor = method.atol
+        floor, square = method.atol, 0.0
+        for i in range(first, first + n if first > 0 else 0):
+            square += run.y[i] * run.y[i]
         if first > 0:
-            square = 0.0
-            for i in range(first, first + n):
-                square += run.y[i] * run.y[i]
             floor = method.rtol * math.sqrt(square / n) + 1e-300
         for i in range(first, first + n):
             size = max(abs(run.y[i]), abs(work.trial[i]))
@@ -122,8 +111,6 @@ def follows_field(model, method, run, tangents, path, work):
             work.error[i] = 0.0
         for j in range(1, len(method.series_nodes)):
             s, weight = method.series_nodes[j] * path.length, method.series_weights[j] * path.length
-            if path.clock >= 0 and _is_beyond_guard(model, run, path, s):
-                break
             _add_residual(model, run, tangents, path, s, weight, noisy, work)
         if _is_small(model, method, run, tangents, work):
             return True
