@@ -89,8 +89,6 @@ def fire(parts, task, stop_cycle, stop_phase, max_jumps):
 def enter(parts, task):
     """Begin a stay in a mode: take the side of every guard; returns ``GO_ON``, or why the run ends."""
     model, run, mode = task.model, task.run, task.run.mode
-    # A jump may have changed a component that tells the time of the forcing.
-    run.calm_mode = 0
     if not finite(run, model.dimension * (1 + task.tangents)):
         return NON_FINITE
     fires = parts.enter(model, run, task.work)
