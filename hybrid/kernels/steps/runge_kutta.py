@@ -9,7 +9,6 @@ from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.tangent import independence
 from hybrid.kernels.events.guards import (
     guard_value,
-    has_terms_in_state,
     is_forced,
     rounding_band,
     sides_at,
@@ -350,10 +349,12 @@ def runge_kutta_step(task, remaining):
     run.steps += 1
     if not ratio <= 1.0:
         return reject(task, h, ratio)
-    interpolated = has_terms_in_state(model, mode)
+    interpolated = is_forced(model, mode)
     if interpolated:
         interpolation_stages(model, method, mode, t, h, run.y, work)
         explained = attempts.explained_attempt(model, method, run, h, work)
+        if explained == 0.0:
+            return reject(task, h, math.inf)
         if explained < h:
             return try_shorter(run, explained)
     fired, correction, whole = NO_TRANSITION, 0.0, h

@@ -317,8 +317,7 @@ class Work(Structure):
     and of a guard on it;
     ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for its isolation; ``registers (r, 6)``,
     what is known of each row of a program, and ``samples (nodes + 1, 2 r)`` the ranges of these rows at the
-    nodes of a step and what they have in common; ``places (nodes + m, n + 1)``,
-    the states and shares of the step at the nodes and at the m stages of the interpolant alone.
+    nodes of a step and what they have in common; ``rates (2, N)``, the field along a step.
 
     For implicit methods, else empty: ``systems ((s + 1) n + s + 4, s n)``, ``pivots ((s + 1) n,)``. The rows
     are the factored matrix of the stages, that of the estimate's filter ``(n, n)``, a right-hand side, and
@@ -353,7 +352,7 @@ class Work(Structure):
     intervals: MATRIX
     registers: MATRIX
     samples: MATRIX
-    places: MATRIX
+    rates: MATRIX
     systems: MATRIX
     pivots: INDICES
     series: MATRIX

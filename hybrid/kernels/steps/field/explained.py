@@ -16,8 +16,8 @@ from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.events.guards import has_program, has_terms_in_state
 from hybrid.kernels.events.path import up_to
 from hybrid.kernels.steps.field.pulses import Asked, first_hidden
-from hybrid.kernels.steps.field.residual import follows_field, is_finite
-from hybrid.kernels.steps.step import combine, interpolant_path, path_of_step
+from hybrid.kernels.steps.field.residual import MARGIN, MARGIN_OF_INTERPOLANT, follows_field, is_finite
+from hybrid.kernels.steps.step import interpolant_path, path_of_step
 from hybrid.kernels.types.codes import ARGUMENTS, HIGH, IN_TIME, LOW, TERMS
 from hybrid.kernels.types.kinds import INTEGER, REAL
 from hybrid.kernels.types.layout import EPSILON, Method, Model, Path, Run, Work
@@ -60,7 +60,7 @@ def _arguments_change(model, mode, path, work):
 
 
 @njit(**KERNEL)
-def _longest_explained(model, method, run, path, nodes, kind, seen, work):
+def _longest_explained(model, method, run, path, nodes, kind, work):
     """The longest part of a path on which the forcings of a kind are explained, down to rounding.
 
     A step is cut to where it is explained. If that is hardly anything, the pulse has begun, and a step as far
@@ -79,7 +79,7 @@ def _longest_explained(model, method, run, path, nodes, kind, seen, work):
             tolerance = 0.0
             if component >= 0:
                 tolerance = (method.atol + method.rtol * abs(run.y[component])) / path.pace
-            asked = Asked(nodes, seen and explained == path.length, tolerance, finest, kind == TERMS)
+            asked = Asked(nodes, tolerance, finest, kind == TERMS)
             place, other, rest = first_hidden(model, program, up_to(path, explained), asked, work)
             coarse = coarse or (kind == IN_TIME and rest > COARSE * tolerance)
             if place < explained:
@@ -109,42 +109,24 @@ def explained_step(model, method, run, h, work):
     for i in range(model.dimension):
         work.path[0, i], work.path[1, i] = run.y[i], work.stages[0, i]
     path = Path(work.path, 1, -1, run.phase, 1.0, h, False)
-    return _longest_explained(model, method, run, path, method.nodes, IN_TIME, False, work)
-
-
-@njit(**KERNEL)
-def _keep_places(model, method, run, h, work):
-    """The states at which an explicit method has evaluated the field of the attempted step, by its nodes.
-
-    They are farther from the solution than the interpolant: what lies there may be hidden from the method.
-    The stages of the interpolant alone come last.
-    """
-    n, s, places, count = model.dimension, method.b.shape[0], work.places, len(method.nodes)
-    for j in range(count - 1):
-        for i in range(s):
-            if method.c[i] == method.nodes[j]:
-                combine(run.y, h, method.a[i], work.stages, i, n, places[j])
-    for i in range(n):
-        places[count - 1, i] = work.new[i]
-    for i in range(s + 1, method.a.shape[0]):
-        place = places[count + i - s - 1]
-        combine(run.y, h, method.a[i], work.stages, i, n, place)
-        place[n] = method.c[i]
+    return _longest_explained(model, method, run, path, method.nodes, IN_TIME, work)
 
 
 @exported(REAL, Model, Method, Run, REAL, Work)
 def explained_attempt(model, method, run, h, work):
-    """The length up to ``h`` of a step on which no pulse in the state is hidden from the attempted one.
+    """The length up to ``h`` of a step that hides no change of the field; zero if the attempt has hidden one.
 
     The interpolant of the attempted step, whose stages are those of ``work``, is the way between its ends.
+    That of an implicit method has the field as its derivative at its nodes, however stiff the field is.
     """
     interpolant_path(method, h, run.y, model.dimension, work)
-    path, explicit = path_of_step(method, run.phase, h, work), method.implicit == 0
+    path, implicit = path_of_step(method, run.phase, h, work), method.implicit != 0
+    if not (implicit or follows_field(model, method, run, 0, path, MARGIN_OF_INTERPOLANT, work)):
+        return 0.0
     if not _arguments_change(model, run.mode, path, work):
         return h
-    if explicit:
-        _keep_places(model, method, run, h, work)
-    return h * _longest_explained(model, method, run, path, method.nodes, TERMS, explicit, work)
+    nodes = method.nodes if implicit else method.series_nodes
+    return h * _longest_explained(model, method, run, path, nodes, TERMS, work)
 
 
 @exported(REAL, Model, Method, Run, INTEGER, Path, Work)
@@ -155,13 +137,13 @@ def explained_series(model, method, run, tangents, path, work):
         return math.nan
     shortest = EPSILON * h + (0.0 if path.clock >= 0 else FINEST * measured_time(model, run, run.mode))
     for _ in range(MOST_CUTS):
-        h = timed = _longest_explained(model, method, run, up_to(path, h), nodes, IN_TIME, False, work)
+        h = timed = _longest_explained(model, method, run, up_to(path, h), nodes, IN_TIME, work)
         if _arguments_change(model, run.mode, up_to(path, h), work):
-            h = _longest_explained(model, method, run, up_to(path, h), nodes, TERMS, False, work)
+            h = _longest_explained(model, method, run, up_to(path, h), nodes, TERMS, work)
         if shortest < h < timed:
             # On a shorter step, the forcing in time has other places to be explained by.
             continue
-        if follows_field(model, method, run, tangents, up_to(path, h), work):
+        if follows_field(model, method, run, tangents, up_to(path, h), MARGIN, work):
             return h
         h *= 0.5
         if not h > shortest:

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 from numba import njit
 
-from hybrid.kernels.events.path import time_at
 from hybrid.kernels.types.codes import (
     HIGH,
     HIGH_MIDDLE,
@@ -23,7 +22,6 @@ from hybrid.kernels.types.codes import (
     MOST_SLOPE,
 )
 from hybrid.kernels.types.kinds import REAL, TRUTH, VECTOR
-from hybrid.kernels.types.layout import Path
 from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Verdicts on a piece of a step.
@@ -42,14 +40,12 @@ MOST_PIECES = 80
 class Asked(NamedTuple):
     """What is asked of an expression on a step, and where a method looks at it.
 
-    ``nodes`` are shares of the step. A method may have ``seen`` other states there than those of the path,
-    which are ``work.places``. ``tolerance`` is that of the expression's integral, zero if unknown. Pieces are
-    no shorter than ``finest``. The bounds of an expression ``of_state`` may be wide: it is unexplained only
-    where the middle of a piece is certain to be.
+    ``nodes`` are shares of the step. ``tolerance`` is that of the expression's integral, zero if unknown.
+    Pieces are no shorter than ``finest``. The bounds of an expression ``of_state`` may be wide: it is
+    unexplained only where the middle of a piece is certain to be.
     """
 
     nodes: VECTOR
-    seen: TRUTH
     tolerance: REAL
     finest: REAL
     of_state: TRUTH
@@ -75,13 +71,6 @@ def _is_steady(model, program, path, tolerance, work):
     return True
 
 
-@njit(**INLINE)
-def _bound_at_stage(model, program, t, row, work):
-    """Bounds of all rows at the time and the state of one stage, a row of ``work.places``; the last row."""
-    place = Path(work.places[row : row + 1], 0, -1, t, 1.0, 0.0, False)
-    return model.bound(model.programs, program, place, 0.0, 0.0, work.registers)
-
-
 @njit(**KERNEL)
 def _take_samples(model, program, path, asked, work):
     """Ranges of all rows at the nodes into ``work.samples``, low and high in turn.
@@ -91,11 +80,7 @@ def _take_samples(model, program, path, asked, work):
     samples, nodes = work.samples, asked.nodes
     common = samples[samples.shape[0] - 1]
     for j in range(len(nodes)):
-        place = nodes[j] * path.length
-        if asked.seen:
-            last = _bound_at_stage(model, program, time_at(path, place), j, work)
-        else:
-            last = model.bound(model.programs, program, path, place, 0.0, work.registers)
+        last = model.bound(model.programs, program, path, nodes[j] * path.length, 0.0, work.registers)
         for row in range(last + 1):
             low, high = work.registers[row, LOW_MIDDLE], work.registers[row, HIGH_MIDDLE]
             samples[j, 2 * row], samples[j, 2 * row + 1] = low, high
@@ -152,25 +137,6 @@ def _judged(programs, program, j, whole, length, tolerance, work):
 
 
 @njit(**KERNEL)
-def _hidden_from_stages(model, program, path, asked, work):
-    """A pulse at a stage that only the interpolant has: the node before it and its place, or the step twice.
-
-    Such a pulse bends the interpolant, which then does not show it.
-    """
-    h, nodes = path.length, asked.nodes
-    for k in range(len(nodes), work.places.shape[0]):
-        place = work.places[k, model.dimension] * h
-        _bound_at_stage(model, program, time_at(path, place), k, work)
-        j = 0
-        while nodes[j + 1] * h < place:
-            j += 1
-        verdict, _ = _judged(model.programs, program, j, False, h, asked.tolerance, work)
-        if verdict == HIDDEN:
-            return nodes[j] * h, place
-    return h, h
-
-
-@njit(**KERNEL)
 def _hidden_between(model, program, path, j, asked, work):
     """``first_hidden`` between the samples ``j`` and ``j + 1``."""
     stack, top, pieces, coarse, tolerance = work.intervals, 0, 0, 0.0, asked.tolerance
@@ -212,10 +178,9 @@ def first_hidden(model, program, path, asked, work):
     if _is_steady(model, program, path, asked.tolerance, work):
         return h, h, 0.0
     _take_samples(model, program, path, asked, work)
-    before, place = _hidden_from_stages(model, program, path, asked, work) if asked.seen else (h, h)
-    for j in range(len(asked.nodes) - 1 if place == h else 0):
+    for j in range(len(asked.nodes) - 1):
         before, place, rest = _hidden_between(model, program, path, j, asked, work)
         coarse = max(coarse, rest)
         if place < h:
-            break
-    return before, place, coarse
+            return before, place, coarse
+    return h, h, coarse
