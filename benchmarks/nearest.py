@@ -187,6 +187,7 @@ NEAREST = {
         "accuracy/test_work_precision.py",
     ),
     "hybrid/kernels/steps/field/explained.py": (
+        "kernels/steps/test_field.py",
         "compiler/bounds/test_forcing.py",
         "compiler/bounds/test_pulses_in_state.py",
     ),

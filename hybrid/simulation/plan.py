@@ -217,6 +217,7 @@ def driver_parts(
         attempt_implicit=vars(load_kernels(module))[name],
         explained_step=needed(forced, lambda: forcing().explained_step),
         explained_attempt=needed(forced, lambda: forcing().explained_attempt),
+        follows_attempt=needed(forced, lambda: forcing().follows_attempt),
         explained_series=needed(forced, lambda: forcing().explained_series),
         crossing_on_path=load_kernels("hybrid.kernels.guards.isolate").crossing_on_path,
     )

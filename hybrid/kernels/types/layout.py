@@ -399,13 +399,15 @@ class Attempts(Structure):
     """What a step may need: parts that are not compiled where they are not called.
 
     ``attempt_implicit`` is the step of an implicit method; ``explained_step``, ``explained_attempt`` and
-    ``explained_series`` shorten a step so that no pulse of the field is hidden from it;
+    ``explained_series`` shorten a step so that no pulse of the field is hidden from it; ``follows_attempt``
+    compares the interpolant of a step with the field;
     ``crossing_on_path`` finds the crossing of a guard that no cheap proof decides.
     """
 
     attempt_implicit: function(REAL, Model, Method, INTEGER, REAL, REAL, VECTOR, INTEGER, Work)
     explained_step: function(REAL, Model, Method, Run, REAL, Work)
     explained_attempt: function(REAL, Model, Method, Run, REAL, Work)
+    follows_attempt: function(TRUTH, Model, Method, Run, REAL, Work)
     explained_series: function(REAL, Model, Method, Run, INTEGER, Path, Work)
     crossing_on_path: function(Pair(REAL), Model, Method, Run, INTEGER, INTEGER, Path, REAL, Work)
 

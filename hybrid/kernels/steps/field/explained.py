@@ -19,7 +19,7 @@ from hybrid.kernels.steps.field.pulses import Asked, first_hidden
 from hybrid.kernels.steps.field.residual import MARGIN, MARGIN_OF_INTERPOLANT, follows_field, is_finite
 from hybrid.kernels.steps.step import interpolant_path, path_of_step
 from hybrid.kernels.types.codes import ARGUMENTS, HIGH, IN_TIME, LOW, TERMS
-from hybrid.kernels.types.kinds import INTEGER, REAL
+from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH
 from hybrid.kernels.types.layout import EPSILON, Method, Model, Path, Run, Work
 from hybrid.kernels.types.options import KERNEL, exported
 
@@ -114,19 +114,31 @@ def explained_step(model, method, run, h, work):
 
 @exported(REAL, Model, Method, Run, REAL, Work)
 def explained_attempt(model, method, run, h, work):
-    """The length up to ``h`` of a step that hides no change of the field; zero if the attempt has hidden one.
+    """The length up to ``h`` of a step on which no pulse in the state is hidden from the attempted one.
 
     The interpolant of the attempted step, whose stages are those of ``work``, is the way between its ends.
-    That of an implicit method has the field as its derivative at its nodes, however stiff the field is.
+    Samples are taken where it has the field as its derivative: at the nodes of an implicit method, and where
+    ``follows_attempt`` compares both for an explicit one.
     """
     interpolant_path(method, h, run.y, model.dimension, work)
-    path, implicit = path_of_step(method, run.phase, h, work), method.implicit != 0
-    if not (implicit or follows_field(model, method, run, 0, path, MARGIN_OF_INTERPOLANT, work)):
-        return 0.0
+    path = path_of_step(method, run.phase, h, work)
     if not _arguments_change(model, run.mode, path, work):
         return h
-    nodes = method.nodes if implicit else method.series_nodes
+    nodes = method.nodes if method.implicit != 0 else method.series_nodes
     return h * _longest_explained(model, method, run, path, nodes, TERMS, work)
+
+
+@exported(TRUTH, Model, Method, Run, REAL, Work)
+def follows_attempt(model, method, run, h, work):
+    """Whether the interpolant of the attempted step has the field as its derivative at a few places.
+
+    That of an implicit method has, at its nodes. Elsewhere a stiff field magnifies what it leaves out.
+    """
+    if method.implicit != 0:
+        return True
+    interpolant_path(method, h, run.y, model.dimension, work)
+    path = path_of_step(method, run.phase, h, work)
+    return follows_field(model, method, run, 0, path, MARGIN_OF_INTERPOLANT, work)
 
 
 @exported(REAL, Model, Method, Run, INTEGER, Path, Work)
