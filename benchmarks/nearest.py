@@ -66,7 +66,6 @@ NEAREST = {
     "hybrid/compiler/taylor/linear.py": ("compiler/taylor/test_series.py", "simulation/test_simulate.py"),
     "hybrid/compiler/taylor/loops.py": ("compiler/taylor/test_series.py",),
     "hybrid/compiler/taylor/sums.py": ("compiler/taylor/test_series.py",),
-    "hybrid/compiler/whole_numbers.py": ("system/test_periodicity.py", "test_arguments.py"),
     "hybrid/errors.py": ("test_arguments.py", "sweep/test_points.py", "compiler/test_opaque.py"),
     "hybrid/kernels/arithmetic/columns.py": ("compiler/taylor/test_series.py",),
     "hybrid/kernels/arithmetic/operations.py": ("kernels/events/test_proved_crossings.py",),

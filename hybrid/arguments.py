@@ -129,24 +129,31 @@ def time_span(name: str, value: object) -> tuple[float, float]:
 def increasing_times(name: str, value: object, t0: float, t1: float) -> np.ndarray:
     """Times ``(N,)`` within ``[t0, t1]`` that never decrease; equal times are allowed."""
     times = numbers(name, value, "be increasing times of shape (N,)")
+    ordered = times.ndim == 1 and (times.size < 2 or bool((times[1:] >= times[:-1]).all()))
+    # Increasing times between finite ones are finite.
+    if ordered and (not times.size or t0 <= times.item(0) <= times.item(-1) <= t1):
+        return times
+    raise _fault_of_times(name, times, t0, t1)
+
+
+def _fault_of_times(name: str, times: np.ndarray, t0: float, t1: float) -> ArgumentError:
+    """What is wrong with times that do not increase within ``[t0, t1]``."""
     if times.ndim != 1:
-        raise ArgumentError(f"{name} must be increasing times of shape (N,); got shape {times.shape}.")
+        return ArgumentError(f"{name} must be increasing times of shape (N,); got shape {times.shape}.")
     finite = np.isfinite(times)
     if not finite.all():
         i = int(np.argmin(finite))
-        raise ArgumentError(f"{name} must be finite; got {name}[{i}] = {times[i]}.")
+        return ArgumentError(f"{name} must be finite; got {name}[{i}] = {times[i]}.")
     falls = np.flatnonzero(times[1:] < times[:-1])
     if falls.size:
         i = int(falls[0])
-        raise ArgumentError(
+        return ArgumentError(
             f"{name} must be increasing times; got {name}[{i}] = {times[i]} before "
             f"{name}[{i + 1}] = {times[i + 1]}. Sort them, with numpy.sort for instance."
         )
-    if times.size and not (times[0] >= t0 and times[-1] <= t1):
-        raise ArgumentError(
-            f"{name} must lie in t_span, [{t0}, {t1}]; got times from {times[0]} to {times[-1]}."
-        )
-    return times
+    return ArgumentError(
+        f"{name} must lie in t_span, [{t0}, {t1}]; got times from {times[0]} to {times[-1]}."
+    )
 
 
 def mapping(name: str, value: object, wanted: str = "map names to numbers") -> dict[Any, Any]:
@@ -211,11 +218,12 @@ def known(what: str, value: object, allowed: Iterable[str], kind: str) -> str:
 def without_tolerances(function: Callable[Given, Kind]) -> Callable[Given, Kind]:
     """A function that says where tolerances belong if it is given some: to the solver."""
     names = inspect.signature(function).parameters
+    misplaced = [name for name in SOLVER_OPTIONS if name not in names]
 
     @functools.wraps(function)
     def call(*args: Given.args, **kwargs: Given.kwargs) -> Kind:
-        for name in SOLVER_OPTIONS:
-            if name in kwargs and name not in names:
+        for name in misplaced:
+            if name in kwargs:
                 raise ArgumentError(
                     f"{function.__name__}: {name}= is an option of the solver. Write "
                     f"solver=Taylor({name}={shown(kwargs[name])}), or another solver such as DOP853."
@@ -250,7 +258,7 @@ def floats(value: object) -> np.ndarray | None:
             return np.array(value, dtype=float)
         if value.dtype.kind in "mM":  # an array of objects would hold their counts of a unit of time
             return None
-    elif isinstance(value, list | tuple) and all(type(each) in _PLAIN for each in value):
+    elif isinstance(value, list | tuple) and _PLAIN.issuperset(map(type, value)):
         try:
             return np.array(value, dtype=float)
         except OverflowError:  # an integer beyond the largest float

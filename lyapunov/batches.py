@@ -5,17 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.accuracy.averages import MAX_BATCHES, Array
+from hybrid.accuracy.averages import Array
 
 # Slots of the state of an accumulator.
 CLOSED = 0
 BATCH_SIZE = 1
 IN_OPEN_BATCH = 2
 
-
-def new_batches(k: int) -> tuple[Array, NDArray[np.int64]]:
-    """Empty accumulator for ``k`` columns: batch sums ``(MAX_BATCHES, k)`` and state ``(3,)`` for `push`."""
-    return np.zeros((MAX_BATCHES, k)), np.array([0, 1, 0], dtype=np.int64)
+# The state of an empty accumulator, whatever its batch sums hold.
+EMPTY = (0, 1, 0)
 
 
 def push(batch_sums: Array, state: NDArray[np.int64], values: Array) -> None:
@@ -30,12 +28,12 @@ def push(batch_sums: Array, state: NDArray[np.int64], values: Array) -> None:
         for i in range(half):
             for c in range(batch_sums.shape[1]):
                 batch_sums[i, c] = batch_sums[2 * i, c] + batch_sums[2 * i + 1, c]
-        batch_sums[half:] = 0.0
         state[CLOSED] = half
         state[BATCH_SIZE] *= 2
     row = state[CLOSED]
     for c in range(batch_sums.shape[1]):
-        batch_sums[row, c] += values[c]
+        before = batch_sums[row, c] if state[IN_OPEN_BATCH] > 0 else 0.0
+        batch_sums[row, c] = before + values[c]
     state[IN_OPEN_BATCH] += 1
     if state[IN_OPEN_BATCH] == state[BATCH_SIZE]:
         state[CLOSED] += 1

@@ -21,7 +21,7 @@ from hybrid.simulation.trajectory import Trajectory
 from hybrid.solvers import Solver
 from hybrid.sweep.rows import At, Place, Rows, rows_of
 from hybrid.sweep.sheet import Labels
-from lyapunov.spectrum import Estimate, LyapunovSpectrum, first_vectors, interval_length
+from lyapunov.spectrum import Estimate, Means, first_vectors, interval_length
 
 if TYPE_CHECKING:
     import xarray
@@ -158,20 +158,21 @@ class Exponents:
 
     def _row(self, rows: Rows, point: Mapping[str, float], place: Place | None) -> dict[str, Any]:
         trajectory = rows.begin(point, place, self._vectors, rows.system)
-        spectrum = Estimate(trajectory, self._length(trajectory)).run(
-            self.transient, self.intervals, False, silent()
-        )
-        return {
-            "exponents": spectrum.exponents,
-            "standard_error": spectrum.standard_error,
-            "sum_rule": spectrum.sum_rule,
-            "jumps_per_interval": spectrum.jumps_per_interval,
-            "x_end": spectrum.x,
-            "mode_end": spectrum.mode,
+        estimate = Estimate(trajectory, self._length(trajectory))
+        means = estimate.run(self.transient, self.intervals, False, silent())
+        found = {
+            "exponents": means.exponents,
+            "standard_error": means.standard_error,
+            "sum_rule": means.sum_rule,
+            "jumps_per_interval": means.jumps_per_interval,
+            "x_end": means.x,
+            "mode_end": means.mode,
             # An axis of length zero could not be read back from a file.
-            **({"section": self._section(rows, point, trajectory, spectrum)} if self.points else {}),
-            "status": spectrum.status,
+            **({"section": self._section(rows, point, trajectory, means)} if self.points else {}),
+            "status": means.status,
         }
+        estimate.release()
+        return found
 
     def carry(self, point: Mapping[str, float], place: Place | None) -> Place | None:
         """State and mode after the transient, rounded up to whole forcing periods to keep the phase."""
@@ -229,17 +230,19 @@ class Exponents:
         return interval_length(trajectory, self.interval, self.transient + self.intervals)
 
     def _section(
-        self, rows: Rows, point: Mapping[str, float], trajectory: Trajectory, spectrum: LyapunovSpectrum
+        self, rows: Rows, point: Mapping[str, float], trajectory: Trajectory, means: Means
     ) -> np.ndarray:
-        if not self.points or not spectrum.status.ok:
+        if not self.points or not means.status.ok:
             return np.full((self.points, rows.system.dimension), np.nan)
         if rows.marked is not rows.system:
             # The system with the surface goes on from here; with a period the phase is all of the time.
-            place, now = (spectrum.x, spectrum.mode), float(trajectory.run.phase)
+            place, now = (means.x, means.mode), float(trajectory.run.phase)
             try:
                 marked = rows.go_on(point, place, None, rows.marked, now)
             except HybridError:
                 return np.full((self.points, rows.system.dimension), np.nan)
             marked.goes_on_from(trajectory)
-            trajectory = marked
+            found, _ = rows.section(marked, self.points)
+            marked.release()
+            return found
         return rows.section(trajectory, self.points)[0]

@@ -1,7 +1,11 @@
-"""The end of an interval of time, as kernels and Python see it."""
+"""The end of an interval of time and what has been summed up to there, as kernels and Python see them."""
 
-from hybrid.kernels.types.kinds import INDICES, VECTOR
-from hybrid.kernels.types.structure import Structure
+from functools import cache
+from typing import Any
+
+from hybrid.accuracy.averages import MAX_BATCHES
+from hybrid.kernels.types.kinds import INDICES, MATRIX, VECTOR
+from hybrid.kernels.types.structure import Layout, Structure
 
 
 class End(Structure, counters=("cycle", "done"), numbers=("phase",)):
@@ -12,3 +16,32 @@ class End(Structure, counters=("cycle", "done"), numbers=("phase",)):
 
     counters: INDICES
     numbers: VECTOR
+
+
+class Sums(Structure):
+    """``hits (T,)``: jumps of each transition in the interval that is under way; sums over those before.
+
+    ``batches (B, k + 1 + T)`` and ``batch_state (3,)`` are those of ``lyapunov.batches``.
+    """
+
+    hits: INDICES
+    batches: MATRIX
+    batch_state: INDICES
+
+
+END = Layout(End, {"counters": (2,), "numbers": (1,)})
+
+
+def end_at(run: Any) -> Any:
+    """The current time of a run as the end of an interval."""
+    end = END.zeros()
+    end.cycle, end.phase = run.cycle, run.phase
+    return end
+
+
+@cache
+def sums_layout(tangents: int, transitions: int) -> Any:
+    """Where the arrays of ``Sums`` lie."""
+    columns = tangents + 1 + transitions
+    shapes = {"hits": (transitions,), "batches": (MAX_BATCHES, columns), "batch_state": (3,)}
+    return Layout(Sums, shapes)

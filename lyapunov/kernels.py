@@ -13,11 +13,11 @@ from hybrid.kernels.types.codes import (
     READY,
     STALE,
 )
-from hybrid.kernels.types.kinds import INDICES, INTEGER, MATRIX, REAL, TRUTH
+from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL, TRUTH
 from hybrid.kernels.types.layout import ADVANCE, Parts, Task
 from hybrid.kernels.types.options import KERNEL, exported
 from lyapunov import batches
-from lyapunov.interval import End
+from lyapunov.interval import End, Sums
 
 UNLIMITED = 9223372036854775807
 
@@ -47,16 +47,17 @@ def advance_and_count(advance, parts, task, cycle, phase, max_steps, hits):
     return code
 
 
-@exported(INTEGER, ADVANCE, Parts, Task, End, REAL, INTEGER, TRUTH, MATRIX, INDICES, MATRIX, INDICES)
-def growth_rates(advance, parts, task, end, interval, max_steps, resumed, rates, hits, batches, batch_state):
+@exported(INTEGER, ADVANCE, Parts, Task, End, Sums, REAL, INTEGER, TRUTH, MATRIX)
+def growth_rates(advance, parts, task, end, sums, interval, max_steps, resumed, rates):
     """Growth rates ``(M, k + 1 + T)`` of ``k`` tangent vectors over ``M`` intervals (Benettin et al. 1980).
 
     The column after them is the other side of the sum rule: the integral of div f plus the log-determinants
-    of the saltation matrices, per unit time. The last columns are the jumps of each transition per unit time;
-    ``hits (T,)`` counts those of the interval that is under way. ``end`` is the end of the last interval.
-    Each row is also added to ``batches``. Returns the driver's code; ``end.done`` is how many intervals were
-    completed. After ``MAX_STEPS`` the next call resumes the interval that was not completed: ``resumed``.
+    of the saltation matrices, per unit time. The last columns are the jumps of each transition per unit time.
+    ``end`` is the end of the last interval. Each row is also added to the batches of ``sums``. Returns the
+    driver's code; ``end.done`` is how many intervals were completed. After ``MAX_STEPS`` the next call
+    resumes the interval that was not completed: ``resumed``.
     """
+    hits = sums.hits
     run, period, n, tangents = task.run, task.model.period, task.model.dimension, task.tangents
     for done in range(rates.shape[0]):
         end.done = done
@@ -79,7 +80,7 @@ def growth_rates(advance, parts, task, end, interval, max_steps, resumed, rates,
         rates[done, tangents] = (run.divergence + run.log_determinant) / interval
         for i in range(hits.shape[0]):
             rates[done, tangents + 1 + i] = hits[i] / interval
-        push(batches, batch_state, rates[done])
+        push(sums.batches, sums.batch_state, rates[done])
     end.done = rates.shape[0]
     return DONE
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from functools import cache
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -31,8 +31,8 @@ from hybrid.simulation.periods import check_time
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.growth import growing
-from lyapunov.batches import closed_batch_means, new_batches
-from lyapunov.interval import End
+from lyapunov.batches import EMPTY, closed_batch_means
+from lyapunov.interval import END, end_at, sums_layout
 from lyapunov.per_transition import JumpRates, PerTransition
 
 if TYPE_CHECKING:
@@ -249,7 +249,7 @@ def lyapunov_spectrum(
     length = interval_length(trajectory, interval, transient + intervals)
     load_kernels("lyapunov.kernels")
     with trajectory.stop, progress_bar(transient + intervals, "Lyapunov spectrum", progress) as bar:
-        return Estimate(trajectory, length).run(transient, intervals, history, bar)
+        return Estimate(trajectory, length).spectrum(transient, intervals, history, bar)
 
 
 def first_vectors(system: HybridSystem, k: int | None) -> np.ndarray:
@@ -295,10 +295,24 @@ def generic_directions(n: int, k: int) -> np.ndarray:
     return np.asarray(directions[:, :k])
 
 
-def end_at(trajectory: Trajectory) -> Any:
-    """The current time of a run as the end of an interval, which the kernels take further."""
-    run = trajectory.run
-    return End(counters=np.array([run.cycle, 0]), numbers=np.array([run.phase]))
+class Means(NamedTuple):
+    """What is found of an orbit over ``intervals`` intervals, as in a `LyapunovSpectrum`.
+
+    ``values`` are the means of all columns of the growth rates, ``batches`` those of batches.
+    """
+
+    exponents: np.ndarray
+    standard_error: np.ndarray
+    sum_rule: float
+    growths: np.ndarray
+    intervals: int
+    jumps_per_interval: float
+    steps_per_interval: float
+    mode: str
+    x: np.ndarray
+    status: Status
+    values: np.ndarray
+    batches: np.ndarray
 
 
 class Estimate:
@@ -307,87 +321,103 @@ class Estimate:
     def __init__(self, trajectory: Trajectory, interval: float) -> None:
         self.trajectory = trajectory
         self.interval = interval
-        self.end = end_at(trajectory)
+        self.end = end_at(trajectory.run)
         self.task = trajectory.task(trajectory.no_record(), orthonormal=True)
         self.grazed_growth = 0.0
-        self.hits = np.zeros(len(trajectory.system.transitions), dtype=np.int64)
+        transitions = len(trajectory.system.transitions)
+        # Numbers per interval: growth rates, the other side of the sum rule, jumps of each transition.
+        self.columns = trajectory.tangents + 1 + transitions
+        self.layout = sums_layout(trajectory.tangents, transitions)
+        self.sums = self.layout.unwritten()
+        self.sums.batch_state[:] = EMPTY
 
-    @property
-    def columns(self) -> int:
-        """Numbers per interval: growth rates, the other side of the sum rule, jumps of each transition."""
-        return self.trajectory.tangents + 1 + len(self.hits)
+    def release(self) -> None:
+        """Let the next run have the memory of this one and of its trajectory, which nobody may look at."""
+        self.layout.take_back(self.sums)
+        END.take_back(self.end)
+        self.trajectory.release()
 
-    def run(self, transient: int, intervals: int, history: bool, bar: Progress) -> LyapunovSpectrum:
+    def spectrum(self, transient: int, intervals: int, history: bool, bar: Progress) -> LyapunovSpectrum:
         """The spectrum over ``intervals`` intervals, after ``transient`` intervals."""
+        found: dict[str, Any] = self.run(transient, intervals, history, bar)._asdict()
+        values, batches = found.pop("values"), found.pop("batches")
+        system = self.trajectory.system
+        return LyapunovSpectrum(
+            **found,
+            interval=self.interval,
+            names=Names(system.state_names, dict(system.units)),
+            jump_rates=JumpRates.of(system, self.trajectory.tangents, values, batches),
+        )
+
+    def run(self, transient: int, intervals: int, history: bool, bar: Progress) -> Means:
+        """What is found over ``intervals`` intervals, after ``transient`` intervals."""
         trajectory, k = self.trajectory, self.trajectory.tangents
         code = codes.DONE
         if transient:
-            scrap = TaperedMean(self.columns), new_batches(self.columns)
-            _, code = self._collect(transient, *scrap, False, bar)
+            _, code = self._collect(transient, None, False, bar)
+            self.sums.batch_state[:] = EMPTY
             self._replace_annihilated()
             # A vector of which only rounding was left is by now a new direction, like those at the start.
             trajectory.run.indistinct = 0
-        mean, batches = TaperedMean(self.columns), new_batches(self.columns)
-        jumps, steps = trajectory.jumps, int(trajectory.run.steps)
+        mean = TaperedMean(self.columns)
+        jumps, steps = trajectory.run.jumps, trajectory.run.steps
         self.grazed_growth = trajectory.run.ill_conditioned_growth
         growths = np.empty((0, k))
         if code == codes.DONE:
-            growths, code = self._collect(intervals, mean, batches, history, bar)
-        values, means = mean.value(), closed_batch_means(*batches)
+            growths, code = self._collect(intervals, mean, history, bar)
+        values, means = mean.value(), closed_batch_means(self.sums.batches, self.sums.batch_state)
         error = standard_error_from_batches(means[:, :k]) * taper_inflation()
-        return LyapunovSpectrum(
-            exponents=values[:k],
-            standard_error=error,
-            sum_rule=float(values[k]),
-            growths=growths,
-            interval=self.interval,
-            intervals=mean.count,
-            jumps_per_interval=(trajectory.jumps - jumps) / max(mean.count, 1),
-            steps_per_interval=(int(trajectory.run.steps) - steps) / max(mean.count, 1),
-            mode=trajectory.mode,
-            x=trajectory.x,
-            status=self._status(code, max(mean.count, 1)),
-            names=Names(trajectory.system.state_names, dict(trajectory.system.units)),
-            jump_rates=JumpRates.of(trajectory.system, k, values, means),
+        count = max(mean.count, 1)
+        return Means(
+            values[:k],
+            error,
+            float(values[k]),
+            growths,
+            mean.count,
+            (trajectory.run.jumps - jumps) / count,
+            (trajectory.run.steps - steps) / count,
+            trajectory.mode,
+            trajectory.x,
+            self._status(code, count),
+            values,
+            means,
         )
 
     def _collect(
-        self, intervals: int, mean: TaperedMean, batches: Any, history: bool, bar: Progress
+        self, intervals: int, mean: TaperedMean | None, history: bool, bar: Progress
     ) -> tuple[np.ndarray, int]:
-        trajectory = self.trajectory
+        trajectory, total = self.trajectory, 0
         kept = [np.empty((0, trajectory.tangents))]
         bursts, code = Bursts([trajectory]), codes.DONE
-        while mean.count < intervals and code == codes.DONE:
+        while total < intervals and code == codes.DONE:
             # Add whole blocks to the mean, so that its rounding does not depend on where bursts end.
-            rates = np.empty((min(INTERVALS_AT_ONCE, intervals - mean.count), self.columns))
+            rates = np.empty((min(INTERVALS_AT_ONCE, intervals - total), self.columns))
             filled, resumed = 0, False
             while filled < len(rates) and code in (codes.DONE, codes.GO_ON):
-                code = self._rates(bursts.most(), resumed, rates[filled:], batches)
+                code = self._rates(bursts.most(), resumed, rates[filled:])
                 done = int(self.end.done)
                 filled += done
                 bar.update(done)
                 code = bursts.judged(code)
                 resumed = code == codes.GO_ON
-            mean.add(rates[:filled])
+            total += filled
+            if mean is not None:
+                mean.add(rates[:filled])
             if history:
                 kept.append(rates[:filled, : trajectory.tangents])
-        return np.concatenate(kept), code
+        return np.concatenate(kept) if history else kept[0], code
 
-    def _rates(self, most: int, resumed: bool, rates: np.ndarray, batches: Any) -> int:
+    def _rates(self, most: int, resumed: bool, rates: np.ndarray) -> int:
         """One burst of the kernel: growth rates over the next intervals, in the rows of ``rates``."""
         kernel, advance = load_kernels("lyapunov.kernels").growth_rates, load_kernels().advance
-        trajectory, end = self.trajectory, self.end
+        trajectory, end, sums = self.trajectory, self.end, self.sums
         end.done = 0
         return trajectory.plan.called(
-            lambda parts: kernel(
-                advance, parts, self.task, end, self.interval, most, resumed, rates, self.hits, *batches
-            ),
+            lambda parts: kernel(advance, parts, self.task, end, sums, self.interval, most, resumed, rates),
             trajectory.run,
             trajectory.work,
-            end.counters,
-            end.numbers,
-            self.hits,
-            *batches,
+            end,
+            sums,
         )
 
     def _replace_annihilated(self) -> None:
@@ -397,9 +427,11 @@ class Estimate:
         the transient alone does not mean that.
         """
         run, n = self.trajectory.run, self.trajectory.model.dimension
+        if run.y[n:].all():
+            return
         vectors = run.y[n:].reshape(-1, n)
-        gone = ~np.any(vectors, axis=1)
-        if np.any(gone):
+        gone = ~vectors.any(axis=1)
+        if gone.any():
             kept = vectors[~gone]
             basis, _ = np.linalg.qr(np.vstack([kept, generic_directions(n, n)]).T)
             vectors[gone] = basis[:, len(kept) : len(vectors)].T

@@ -22,7 +22,8 @@ from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
-from lyapunov.spectrum import INTERVALS_AT_ONCE, end_at, interval_length
+from lyapunov.interval import end_at
+from lyapunov.spectrum import INTERVALS_AT_ONCE, interval_length
 
 # The renormalised companion has no digits left this many roundings of the state from the orbit, or so near
 # the least of all numbers.
@@ -320,7 +321,7 @@ def _follow(
     kernel = load_kernels("lyapunov.kernels").distances
     advance = load_kernels().advance
     runs: list[Any] = [reference, *companions]
-    end = end_at(reference)
+    end = end_at(reference.run)
     tasks = [run.task(run.no_record()) for run in runs]
     kept, total, code = [np.empty((0, 2))], 0, codes.DONE
     bursts = Bursts(runs)

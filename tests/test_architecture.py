@@ -67,6 +67,9 @@ KERNEL_ROOMS = tuple(
         "drive",
     )
 )
+DOOR = "hybrid.kernels.types.numba_door"
+INNER_PACKAGES = (("numba", "core"), ("numba", "np"))
+PUBLIC_PARTS = ("numba", "numba.extending", "numba.types", "llvmlite", "llvmlite.binding", "llvmlite.ir")
 HEAVY = ("matplotlib", "networkx", "numba", "pandas", "pint", "scipy", "sympy", "xarray")
 MAX_LINES = 500
 
@@ -184,6 +187,18 @@ def test_no_circle_of_imports():
 def test_kernels_know_only_numpy_the_compiler_and_each_other():
     offences = [found for found in imports_in("hybrid/kernels") if not found.is_of(*KERNELS_MAY_IMPORT)]
     assert not offences, report(offences)
+
+
+def test_only_the_door_knows_parts_of_the_compiler_that_may_change():
+    def is_private(found):
+        return found.is_of("numba", "llvmlite") and (
+            found.module not in PUBLIC_PARTS or (found.module, found.name) in INNER_PACKAGES
+        )
+
+    private = [found for package in PACKAGES for found in imports_in(package) if is_private(found)]
+    outside = [found for found in private if not module_of(found.path).startswith(DOOR)]
+    assert len(private) > len(outside)
+    assert not outside, report(outside)
 
 
 def test_hybrid_knows_neither_its_models_nor_its_users():

@@ -134,6 +134,10 @@ def _autoregressive_spectrum(r: Array, count: int, nu: int) -> Array:
     return ((1.0 - r) ** 2 / (1.0 - 2.0 * r * np.cos(angle) + r**2)).mean(axis=0)
 
 
+# Of the places in a series: three sums with these weights give the tapered mean.
+POWERS = np.array([[2.0], [3.0], [4.0]])
+
+
 class TaperedMean:
     r"""Mean of a growing series, with weights for which regular motion averages out fast.
 
@@ -164,18 +168,18 @@ class TaperedMean:
 
     def add(self, rows: Array) -> None:
         """Append ``rows (m, columns)`` to the series."""
-        place = self.count + np.arange(len(rows)) + 0.5
-        self._collapsed |= (rows == -np.inf).any(axis=0)
-        finite = np.where(rows == -np.inf, 0.0, rows)
-        self._moments += np.stack([place**2, place**3, place**4]) @ finite
+        collapsed = rows == -np.inf
+        if collapsed.any():
+            self._collapsed |= collapsed.any(axis=0)
+            rows = np.where(collapsed, 0.0, rows)
+        self._moments += (np.arange(len(rows)) + (self.count + 0.5)) ** POWERS @ rows
         self.count += len(rows)
 
     def value(self) -> Array:
         """The mean ``(columns,)`` so far; ``nan`` without rows, minus infinity after an entry of -inf."""
         if self.count == 0:
             return np.full(self._moments.shape[1], np.nan)
-        mean = _tapered(self._moments[:, None], np.array([float(self.count)]))[0]
-        return np.where(self._collapsed, -np.inf, mean)
+        return np.where(self._collapsed, -np.inf, _tapered(self._moments, float(self.count)))
 
 
 def running_tapered_mean(series: Array) -> Array:
@@ -184,12 +188,11 @@ def running_tapered_mean(series: Array) -> Array:
     finite = np.where(series == -np.inf, 0.0, series)
     moments = np.stack([np.cumsum(place**power * finite, axis=0) for power in (2, 3, 4)])
     collapsed = np.logical_or.accumulate(series == -np.inf, axis=0)
-    return np.where(collapsed, -np.inf, _tapered(moments, np.arange(1.0, len(series) + 1.0)))
+    return np.where(collapsed, -np.inf, _tapered(moments, np.arange(1.0, len(series) + 1.0)[:, None]))
 
 
-def _tapered(moments: Array, count: Array) -> Array:
-    """Tapered means ``(m, k)`` from the moments ``(3, m, k)`` of the first ``count (m,)`` rows."""
-    size = count[:, None]
+def _tapered(moments: Array, size: Array | float) -> Array:
+    """Tapered means from the moments, three along the first axis, of the first ``size`` rows."""
     # Sum of the weights, in closed form by the sums of even powers at half-integers.
     square = size * (4 * size**2 - 1) / 12
     cube = size**2 * (2 * size**2 - 1) / 8

@@ -176,14 +176,12 @@ def _difference(
     i = int(np.argmax(wrong))
     if np.isfinite(found[i]):
         cause = (
-            "a branch on the type of a number, an error that it catches, a state of its own, or a global "
-            "that has changed. Model functions must be pure functions of the values of (t, x, p)"
+            "a branch on the type of a number, an error that it catches, a state of its own, a global that "
+            "has changed, or whole numbers beyond 64 bits (write floats: 1.0 in place of 1). Model functions "
+            "must be pure functions of the values of (t, x, p)"
         )
     else:
-        cause = (
-            "a whole number beyond 2**63 (write floats: 1.0 in place of 1, 7e9 in place of 7_000_000_000), "
-            "an index out of range or an error that it raises"
-        )
+        cause = "an index out of range or an error that it raises"
     place = title if len(wanted) == 1 else f"{title}: value {i}"
     return _told(system, place, found[i], wanted[i], t, x, values, cause)
 

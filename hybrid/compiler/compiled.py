@@ -217,15 +217,21 @@ class CompiledSystem:
     def at(self, parameters: Mapping[str, float] | None, model: Any) -> Any:
         """A model at parameter values."""
         values = self.system.parameter_values(parameters)
-        # Runs may share a model.
-        values.flags.writeable = False
-        period = period_at(self.system.period, self.system.variables, values) or 0.0
-        if parameters and not self.emitted.proved_period:
-            self._check_period(values, period)
+        period = self.period_at(values, given=bool(parameters))
         changes: dict[str, Any] = {"parameters": values, "period": period}
         if self.emitted.programs.rows:
             changes["programs"] = self._programs.replace(parameters=values)
-        return model.replace(**changes)
+        found = model.replace(**changes)
+        # Runs may share a model.
+        values.flags.writeable = False
+        return found
+
+    def period_at(self, values: np.ndarray, *, given: bool = True) -> float:
+        """The forcing period, or 0, at a parameter vector; ``given`` if these are not the default values."""
+        period = period_at(self.system.period, self.system.variables, values) or 0.0
+        if given and not self.emitted.proved_period:
+            self._check_period(values, period)
+        return period
 
     def _check_period(self, values: np.ndarray, period: float) -> None:
         """ArgumentError unless the functions have the period at these values, which are remembered."""
@@ -309,6 +315,11 @@ class CompiledSystem:
             tangent_columns=_indices(each.series.tangent_columns for each in self.emitted.propagators),
             period=0.0,
         )
+
+    @cached_property
+    def is_smooth(self) -> bool:
+        """Whether no field jumps or has an infinite slope inside of its mode."""
+        return not any(self.emitted.discontinuities) and not any(self.emitted.steep_inside)
 
     @property
     def is_timed(self) -> bool:

@@ -13,9 +13,6 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
-# Numba's event at the begin and at the end of each of its passes.
-PASS = "numba:run_pass"
-
 
 @contextmanager
 def between_passes() -> Iterator[None]:
@@ -43,14 +40,11 @@ def _passes_ask(pressed: list[int]) -> AbstractContextManager[Any]:
     """Raise Ctrl-C between two passes of numba within this block; LLVM's alone are short."""
     if "numba" not in sys.modules:
         return nullcontext()
-    from numba.core.event import Event, Listener, install_listener
+    from hybrid.kernels.types.numba_door import session
 
-    class Asking(Listener):  # type: ignore[misc, unused-ignore]
-        def on_start(self, event: Event) -> None:
-            if pressed and threading.current_thread() is threading.main_thread():
-                raise KeyboardInterrupt
+    def ask() -> None:
+        if pressed and threading.current_thread() is threading.main_thread():
+            raise KeyboardInterrupt
 
-        on_end = on_start
-
-    installed: AbstractContextManager[Any] = install_listener(PASS, Asking())
-    return installed
+    asked: AbstractContextManager[Any] = session.between_passes(ask)
+    return asked

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dis
 import math
 from collections.abc import Callable, Mapping
+from functools import lru_cache
 from types import FunctionType
 from typing import Any
 
@@ -14,6 +15,8 @@ from hybrid.compiler.cache.loader import import_numba
 from hybrid.compiler.interrupts import between_passes
 from hybrid.errors import ModelError
 from hybrid.system.derivatives import COMPLEX_STEP
+from hybrid.system.functions import checked_changes
+from hybrid.system.labels import plain_name
 from hybrid.system.variables import PARAMETERS, STATE, plain_class
 
 LONGEST_REASON = 300
@@ -99,14 +102,13 @@ def compiled_functions(name: str, opaque: OpaqueFunction) -> dict[str, Any]:
 def _compiled(name: str, opaque: OpaqueFunction) -> dict[str, Any]:
     from numba import cfunc, float64, int64, njit, void
 
-    from hybrid.compiler.changed_components import compiler_for
-    from hybrid.compiler.whole_numbers import readonly
     from hybrid.kernels.types.kinds import VECTOR
-    from hybrid.kernels.types.numba_types import numba_type
+    from hybrid.kernels.types.numba_door.model_functions import compiler_for, readonly
+    from hybrid.kernels.types.numba_door.numba_types import numba_type
 
-    pipeline = compiler_for(opaque.state if opaque.completed else None)
+    pipeline = compiler_for(_completion(opaque.state) if opaque.completed else None)
     compiled = njit(error_model="numpy", boundscheck=True, pipeline_class=pipeline)
-    function = compiled(_own_copy(opaque.function))
+    function = compiled(opaque.function)
     scope: dict[str, Any] = {"function": function, "readonly": readonly}
     if isinstance(opaque.state, tuple):
         scope["State"] = plain_class(STATE, opaque.state)
@@ -166,20 +168,17 @@ def _indices(place: int, shape: tuple[int, ...]) -> list[int]:
     return indices
 
 
-def _own_copy(function: Callable[..., Any]) -> FunctionType:
-    """The function with large whole numbers among its defaults replaced by floats."""
-    from hybrid.compiler.whole_numbers import LARGEST_INDEX
+@lru_cache(maxsize=256)
+def _completion(state: int | tuple[str, ...]) -> Callable[[list[tuple[Any, Any]]], list[Any]]:
+    """How the items of a dict that a reset returns become all components of the state."""
 
-    assert isinstance(function, FunctionType)
-    defaults = tuple(
-        float(value) if type(value) is int and abs(value) > LARGEST_INDEX else value
-        for value in function.__defaults__ or ()
-    )
-    copy = FunctionType(
-        function.__code__, function.__globals__, function.__name__, defaults, function.__closure__
-    )
-    copy.__module__ = function.__module__
-    return copy
+    def completed(items: list[tuple[Any, Any]]) -> list[Any]:
+        if any(key is None for key, _ in items):
+            raise ModelError("the names in the dict that a reset returns must be written as they are")
+        changed = {plain_name(key): value for key, value in items}
+        return [changed.get(name, name) for name in checked_changes(changed, state)]
+
+    return completed
 
 
 def _refusal(opaque: OpaqueFunction, scope: Mapping[str, Any], error: Exception) -> ModelError:

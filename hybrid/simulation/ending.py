@@ -39,7 +39,7 @@ SOON = 1e-6
 def status_of(trajectory: Trajectory, code: int) -> Status:
     """Status of a run after its ``advance`` returned ``code``."""
     _grow(trajectory, code)
-    complete = code == codes.DONE and not trajectory.tangents
+    complete = code == codes.DONE and (not trajectory.tangents or _carries_plainly(trajectory))
     if complete and is_plain(trajectory.model, trajectory.run, len(trajectory.beyond)):
         return SUCCESS
     status = _status(trajectory, code)
@@ -47,6 +47,13 @@ def status_of(trajectory: Trajectory, code: int) -> Status:
     if status.code != StatusCode.DISCONTINUOUS_FIELD:
         notes += _kinks(trajectory)
     return attrs.evolve(status, message=" ".join([status.message, *notes])) if notes else status
+
+
+def _carries_plainly(trajectory: Trajectory) -> bool:
+    """Whether there is nothing to tell of the tangent vectors of a run that has reached its end."""
+    run = trajectory.run
+    met = run.singular_jumps + run.ill_conditioned + run.steep_jumps + run.field_jumps + run.indistinct
+    return met == 0 and trajectory.compiled.is_smooth and not trajectory.system.switching
 
 
 def _notes(trajectory: Trajectory, code: int) -> list[str]:

@@ -34,9 +34,8 @@ def choose_mode(
         If the name is unknown, no mode allows the state, or more than one does.
     """
     modes = system.mode_names
-    own = {each.part_of or each.name for each in system.modes}
-    if mode is None and len(own) == 1:
-        [mode] = own
+    if mode is None and len(system.whole_modes) == 1:
+        [mode] = system.whole_modes
     if mode is not None:
         within = system.parts_of(mode)
         verdicts, _ = _verdicts(system, parts, model, run, work, within)
@@ -46,6 +45,8 @@ def choose_mode(
             within = [i for i in within if (None, modes[i]) not in against]
         if len(within) == 1 or move_alike(system, model, run, [modes[i] for i in within]):
             index = within[0]
+            if codes.BEYOND not in verdicts:
+                return index, ()
             said = zip(system.transitions, verdicts, strict=True)
             beyond = [tr for tr, verdict in said if verdict == codes.BEYOND and tr.source == modes[index]]
             return index, tuple(tr.name for tr in beyond)

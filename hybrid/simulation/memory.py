@@ -42,21 +42,72 @@ def memory_for_records() -> float:
 
 def workspace(method: Any, dimension: int, tangents: int, columns: int, rows: int = 0) -> Any:
     """Scratch memory for one run; ``columns`` are those of series, ``rows`` those of the guards' programs."""
-    return fresh_work(work_layout(method, dimension, tangents, columns, rows), method)
-
-
-def fresh_work(layout: Any, method: Any) -> Any:
-    """Scratch memory that knows nothing of another run."""
-    work = layout.zeros()
-    if method.implicit:
-        # There is no last step whose polynomial could be a guess.
-        work.systems[-1] = -1.0
+    layout = work_layout(method, dimension, tangents, columns, rows)
+    work = layout.unwritten()
+    _clear_work(work, layout, method)
     return work
 
 
-def starts_of(plan: Any, run: Any, work: Any, origins: np.ndarray, **others: Any) -> Any:
-    """The ``Starts`` of runs in a memory that is fresh, with the other fields that they need."""
-    run_words, work_words = plan.run_layout.words(run), plan.work_layout.words(work)
+def _clear_work(work: Any, layout: Any, method: Any) -> None:
+    """Let scratch memory know nothing of another run."""
+    layout.clear(work)
+    if method.implicit:
+        # There is no last step whose polynomial could be a guess.
+        work.systems[-1] = -1.0
+
+
+class Memory:
+    """The structures of a plan's run, which the next run takes over when this one is released."""
+
+    def __init__(self, plan: Any) -> None:
+        self.plan = plan
+        self.run, self.work = plan.run_layout.unwritten(), plan.work_layout.unwritten()
+        self._model: Any = None
+        self._tasks: dict[tuple[bool, bool], Any] = {}
+
+    def begin(
+        self, model: Any, state: np.ndarray, tangent: np.ndarray | None, t0: float, horizon: float = 0.0
+    ) -> float:
+        """Put the run to its start, in no mode yet; the phase there. ``horizon`` is how long it takes."""
+        plan, run, n = self.plan, self.run, model.dimension
+        plan.run_layout.renew(run)
+        _clear_work(self.work, plan.work_layout, plan.method)
+        run.cycle, run.phase = split_time(t0, model.period)
+        run.horizon = horizon
+        y = run.y
+        y[:n] = state
+        if tangent is not None:
+            y[n:] = tangent.T.ravel()
+        np.abs(state, out=run.scale)
+        return float(run.phase)
+
+    def model_at(self, values: np.ndarray, period: float) -> Any:
+        """The plan's model at a parameter vector; it is changed when another run takes this memory."""
+        if self._model is None:
+            model, own = self.plan.model, np.empty_like(values)
+            changes = {"programs": model.programs.replace(parameters=own)} if len(model.programs.rows) else {}
+            self._model = model.replace(parameters=own, **changes)
+        self._model.parameters[:] = values
+        self._model.put(period=period)
+        return self._model
+
+    def task(self, model: Any, *, orthonormal: bool) -> Any:
+        """What the driver works on in a run without a record."""
+        key = model is self.plan.model, orthonormal
+        if not (key[0] or model is self._model):
+            return self._task(model, orthonormal)
+        if key not in self._tasks:
+            self._tasks[key] = self._task(model, orthonormal)
+        return self._tasks[key]
+
+    def _task(self, model: Any, orthonormal: bool) -> Any:
+        return self.plan.task.replace(run=self.run, work=self.work, model=model, orthonormal=int(orthonormal))
+
+
+def starts_of(memory: Memory, origins: np.ndarray, **others: Any) -> Any:
+    """The ``Starts`` of runs in a memory at the start of a run, with the other fields that they need."""
+    plan = memory.plan
+    run_words, work_words = plan.run_layout.words(memory.run), plan.work_layout.words(memory.work)
     return Starts(
         counters=np.zeros(2, dtype=np.int64),
         origins=origins,
@@ -113,6 +164,12 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int, rows: 
     return Layout(Work, shapes)
 
 
+@cache
+def no_record(dimension: int) -> Any:
+    """A record that keeps nothing: as nobody writes to it, all runs share it."""
+    return empty_record(dimension, 0)
+
+
 def empty_record(dimension: int, degree: int, steps: int = 0, jumps: int = 0) -> Any:
     """A record with room for that many steps and jumps; none means that they are not kept."""
     # Room that is not used costs nothing, not even to be cleared: all is written before it is read.
@@ -143,7 +200,7 @@ def record_layout(dimension: int, degree: int, steps: int, jumps: int) -> Any:
 
 @lru_cache(MOST_LAYOUTS)
 def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> Any:
-    """Where the arrays of a run lie."""
+    """Where the arrays of a run lie, and what they hold in one that has no mode yet and has not jumped."""
     n = dimension
     shapes = {
         "counters": (len(COUNTERS),),
@@ -166,38 +223,10 @@ def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> A
         "growth_before": (tangents,),
         "instant": (n * (1 + n),),
     }
-    return Layout(Run, shapes)
-
-
-@cache
-def _first_entries() -> tuple[np.ndarray, np.ndarray]:
-    """The named entries of a run that has no mode yet and has not jumped."""
-    counters = dict.fromkeys(COUNTERS, 0) | {
-        "stage": codes.ENTERING,
-        "last_fired": codes.NO_TRANSITION,
-        "pending": codes.NO_TRANSITION,
-        "previous_mode": codes.NO_MODE,
-    }
-    numbers = dict.fromkeys(NUMBERS, 0.0) | {"last_jump_phase": np.nan}
-    return np.array(list(counters.values())), np.array(list(numbers.values()))
-
-
-def fresh_run(
-    layout: Any,
-    model: Any,
-    state: np.ndarray,
-    tangent: np.ndarray | None,
-    t0: float,
-    horizon: float = 0.0,
-) -> tuple[Any, float]:
-    """The run at its start, in no mode yet, and the phase of the start; ``horizon`` is how long it takes."""
-    run, n = layout.zeros(), model.dimension
-    y = run.y
-    cycle, phase = split_time(t0, model.period)
-    run.counters[:], run.numbers[:] = _first_entries()
-    run.cycle, run.phase, run.horizon = cycle, phase, horizon
-    y[:n] = state
-    if tangent is not None:
-        y[n:] = tangent.T.ravel()
-    np.abs(state, out=run.scale)
-    return run, phase
+    layout = Layout(Run, shapes)
+    first = layout.zeros()
+    first.stage, first.previous_mode = codes.ENTERING, codes.NO_MODE
+    first.last_fired = first.pending = codes.NO_TRANSITION
+    first.last_jump_phase = np.nan
+    layout.begin_as(first)
+    return layout

@@ -15,7 +15,8 @@ from hybrid.compiler.compiled import CompiledSystem
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
 from hybrid.kernels.types.layout import Attempts, Method, Parts, Task
-from hybrid.simulation.memory import MOST_LAYOUTS, run_layout, work_layout
+from hybrid.kernels.types.structure import MOST_SPARES
+from hybrid.simulation.memory import MOST_LAYOUTS, Memory, no_record, run_layout, work_layout
 from hybrid.solvers import Solver, Taylor
 from hybrid.solvers.tableau import SERIES_NODES, SERIES_WEIGHTS
 from hybrid.status import StatusCode
@@ -40,7 +41,7 @@ class Plan:
     """What all runs of a system by a solver, with so many tangent vectors, have in common.
 
     ``parts_so_far`` are ``parts`` without those that few runs call and that are not compiled yet. ``task``
-    lacks only what a run has for itself. ``model`` is that at the default parameters, see
+    keeps no record and lacks only what a run has for itself. ``model`` is that at the default parameters, see
     ``CompiledSystem.moved_by``. ``propagators`` says how each mode is advanced, by the name of the mode;
     ``degree`` is that of the steps in a record.
     """
@@ -53,6 +54,19 @@ class Plan:
     degree: int
     run_layout: Any
     work_layout: Any
+    spares: list[Memory] = attrs.field(factory=list, init=False)
+
+    def memory(self) -> Memory:
+        """The memory for a run."""
+        try:
+            return self.spares.pop()
+        except IndexError:
+            return Memory(self)
+
+    def take_back(self, memory: Memory) -> None:
+        """Keep the memory of a run that nobody can advance or look at any more."""
+        if len(self.spares) < MOST_SPARES:
+            self.spares.append(memory)
 
     @property
     def parts(self) -> Any:
@@ -134,7 +148,7 @@ def _task(attempts: Any, model: Any, method: Any, tangents: int) -> Any:
         model=model,
         method=method,
         run=Absent(),
-        record=Absent(),
+        record=no_record(model.dimension),
         work=Absent(),
         tangents=tangents,
         orthonormal=0,

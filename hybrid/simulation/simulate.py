@@ -133,6 +133,8 @@ def simulate(
 
 
 def _parameter_names(system: HybridSystem, given: Any) -> tuple[str, ...]:
+    if isinstance(given, tuple) and not given:
+        return ()
     names = arguments.items("sensitivities", given, "be names of parameters")
     for name in names:
         arguments.known("sensitivities: Parameter", name, system.parameters, "Parameters")
@@ -208,7 +210,7 @@ class _Recorder:
             mode, j = self.places[:, : self.sampled]
         return HybridArc(
             system,
-            dict(zip(system.parameters, model.parameters.tolist(), strict=True)),
+            dict(zip(system.variables.parameter_names, model.parameters.tolist(), strict=True)),
             t,
             j,
             x,
@@ -235,7 +237,7 @@ class _Recorder:
     def _advance(self, t1: float, max_jumps: int) -> int:
         """Run until the record is full or the run ends; the code."""
         record = self.layout.unwritten()
-        record.used[:] = 0
+        record.used.fill(0)
         code = self.trajectory.advance(t1, record, max_jumps)
         self._file(record)
         return code
@@ -279,8 +281,9 @@ class _Recorder:
         """States at the samples that fall on the very end of the run: those after its last jump."""
         assert self.times is not None
         stop = int(self.times.searchsorted(t, side="right"))
-        self.states[self.sampled : stop] = x
-        self.places[0, self.sampled : stop], self.places[1, self.sampled : stop] = mode, self.trajectory.jumps
+        last = slice(self.sampled, stop)
+        self.states[last] = x
+        self.places[0, last], self.places[1, last] = mode, self.trajectory.jumps
         self.sampled = stop
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import attrs
@@ -15,7 +15,7 @@ from hybrid.kernels.types import codes
 from hybrid.kernels.types.codes import UNLIMITED
 from hybrid.simulation.initial_mode import choose_mode
 from hybrid.simulation.interrupt import CTRL_C, FIRST_BURST, Bursts, Stop
-from hybrid.simulation.memory import empty_record, fresh_run, fresh_work
+from hybrid.simulation.memory import Memory
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import Plan, check_solver, plan_of
 from hybrid.solvers import Solver
@@ -51,29 +51,65 @@ def start(
     t0 = arguments.number(time, t0)
     mode = mode if by_guards else starting_mode(system, mode)
     if system.growth is not None:
-        values = system.parameter_values(parameters)
-        if system.growth.place(t0, state, values, mode):
-            raise Unexplored(mode)
-    compiled = compile_system(system)
-    solver = check_solver(solver)
-    tangents = 0 if tangent is None else tangent.shape[1]
-    plan = plan_of(compiled, solver, tangents)
-    model = compiled.given(parameters, plan.model)
-    check_time(time, t0, model.period)
-    run, phase0 = fresh_run(plan.run_layout, model, state, tangent, t0, horizon)
-    work = fresh_work(plan.work_layout, plan.method)
-    run.mode, beyond = choose_mode(system, plan.parts_so_far, model, run, work, mode)
-    if beyond and model.propagator[run.mode] in (codes.DESINGULARISED, codes.ROOTED):
-        # These series hold the root of a guard, which may be negative here.
-        plan = plan_of(compiled, solver, tangents, by_steps=int(run.mode))
-        model = compiled.given(parameters, plan.model)
-        work = fresh_work(plan.work_layout, plan.method)
-    return Trajectory(compiled, plan, model, run, work, tangents, solver.max_steps, phase0, beyond, stop)
+        explore(system, t0, state, system.parameter_values(parameters), mode)
+    common = Common(compile_system(system), check_solver(solver), tangent, t0, time, horizon, stop)
+    return common.begin(state, mode, lambda plan, memory: common.compiled.given(parameters, plan.model))
+
+
+def explore(system: HybridSystem, t0: float, state: np.ndarray, values: np.ndarray, mode: str | None) -> None:
+    """Unexplored if modes of a growing system in which a run may start have been made only now."""
+    if system.growth is not None and system.growth.place(t0, state, values, mode):
+        raise Unexplored(mode)
+
+
+@attrs.frozen(eq=False)
+class Common:
+    """What runs share that begin at one time by one solver: they differ in start and parameters.
+
+    The fields are those of ``start``, everything about them checked.
+    """
+
+    compiled: CompiledSystem
+    solver: Solver
+    tangent: np.ndarray | None
+    t0: float
+    time: str = "t0"
+    horizon: float = 0.0
+    stop: Stop = CTRL_C
+
+    def begin_at(self, state: np.ndarray, mode: str | None, values: np.ndarray) -> Trajectory:
+        """A trajectory at its start, at a parameter vector."""
+        period = self.compiled.period_at(values)
+        return self.begin(state, mode, lambda plan, memory: memory.model_at(values, period))
+
+    def begin(
+        self, state: np.ndarray, mode: str | None, model_of: Callable[[Plan, Memory], Any]
+    ) -> Trajectory:
+        """A trajectory at its start; ``model_of(plan, memory)`` is the model at the parameters of the run."""
+        compiled, tangents = self.compiled, 0 if self.tangent is None else self.tangent.shape[1]
+        plan = plan_of(compiled, self.solver, tangents)
+        memory = plan.memory()
+        model = model_of(plan, memory)
+        check_time(self.time, self.t0, model.period)
+        phase0 = memory.begin(model, state, self.tangent, self.t0, self.horizon)
+        run = memory.run
+        index, beyond = choose_mode(compiled.system, plan.parts_so_far, model, run, memory.work, mode)
+        if beyond and model.propagator[index] in (codes.DESINGULARISED, codes.ROOTED):
+            # These series hold the root of a guard, which may be negative here.
+            plan.take_back(memory)
+            plan = plan_of(compiled, self.solver, tangents, by_steps=index)
+            memory = plan.memory()
+            model = model_of(plan, memory)
+            memory.begin(model, state, self.tangent, self.t0, self.horizon)
+            choose_mode(compiled.system, plan.parts_so_far, model, memory.run, memory.work, mode)
+        memory.run.mode = index
+        most = self.solver.max_steps
+        return Trajectory(compiled, plan, model, memory, tangents, most, phase0, beyond, self.stop)
 
 
 @attrs.frozen(eq=False)
 class Trajectory:
-    """A run that can be advanced. ``run`` and ``work`` are mutated by the kernels; all else is fixed.
+    """A run that can be advanced. Kernels change what is in its ``memory``; all else is fixed.
 
     ``beyond`` names the transitions whose guards the start lies beyond.
     """
@@ -81,13 +117,22 @@ class Trajectory:
     compiled: CompiledSystem
     plan: Plan
     model: Any
-    run: Any
-    work: Any
+    memory: Memory
     tangents: int
     max_steps: int
     phase0: float
     beyond: tuple[str, ...] = ()
     stop: Stop = CTRL_C
+
+    @property
+    def run(self) -> Any:
+        """The state of the run."""
+        return self.memory.run
+
+    @property
+    def work(self) -> Any:
+        """Its scratch memory."""
+        return self.memory.work
 
     @property
     def method(self) -> Any:
@@ -209,24 +254,19 @@ class Trajectory:
 
         With ``orthonormal`` these are orthonormalised whenever they come too close to each other.
         """
+        task = self.memory.task(self.model, orthonormal=orthonormal)
+        changes: dict[str, Any] = {}
+        if record is not task.record:
+            changes["record"] = record
         # A run may go on without the tangent vectors that it began with.
-        changes: dict[str, Any] = {
-            "run": self.run,
-            "record": record,
-            "work": self.work,
-            "tangents": self.tangents,
-        }
-        if self.model is not self.plan.model:
-            changes["model"] = self.model
-        if orthonormal:
-            changes["orthonormal"] = 1
-        return self.plan.task.replace(**changes)
+        if self.tangents != task.tangents:
+            changes["tangents"] = self.tangents
+        return task.replace(**changes) if changes else task
 
     def release(self) -> None:
         """Let the next run have the memory of this one, which cannot be advanced or looked at any more."""
-        self.plan.run_layout.take_back(self.run)
-        self.plan.work_layout.take_back(self.work)
+        self.plan.take_back(self.memory)
 
     def no_record(self) -> Any:
         """A record that keeps nothing."""
-        return empty_record(self.model.dimension, self.plan.degree)
+        return self.plan.task.record

@@ -18,7 +18,7 @@ from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import CTRL_C, Bursts
 from hybrid.simulation.labelled import Names, attributes
-from hybrid.simulation.memory import fresh_run, fresh_work, starts_of
+from hybrid.simulation.memory import starts_of
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import check_solver, plan_of
 from hybrid.simulation.simulate import simulate
@@ -247,18 +247,15 @@ class _Runs:
             return
         plan, found, part = self.plan, self.found, slice(block.start, block.stop)
         origins, states = found.origins[part], found.states[part]
-        run, phase0 = fresh_run(
-            plan.run_layout, self.model, origins[0], None, self.t_span[0], self.t_span[1] - self.t_span[0]
-        )
-        work = fresh_work(plan.work_layout, plan.method)
+        memory = plan.memory()
+        t0, t1 = self.t_span
+        phase0 = memory.begin(self.model, origins[0], None, t0, t1 - t0)
         solver = self.options["solver"]
-        trajectory = Trajectory(
-            self.compiled, plan, self.model, run, work, 0, solver.max_steps, phase0, stop=CTRL_C
-        )
+        trajectory = Trajectory(self.compiled, plan, self.model, memory, 0, solver.max_steps, phase0)
         places = np.zeros((len(block), 3), dtype=np.int64)
         limits = {"max_steps": solver.max_steps, "max_jumps": self.max_jumps}
-        starts = starts_of(plan, run, work, origins, named=self.named, found=places, **limits)
-        memory = starts.run_words, starts.work_words, places, starts.verdicts, starts.counters
+        starts = starts_of(memory, origins, named=self.named, found=places, **limits)
+        changed = starts.run_words, starts.work_words, places, starts.verdicts, starts.counters
         kernel = load_kernels("hybrid.kernels.events.many").many_runs
         advance, task = load_kernels().advance, trajectory.task(trajectory.no_record())
         told: list[int] = []
@@ -269,7 +266,7 @@ class _Runs:
             def more(parts: Any, budget: int = bursts.steps) -> int:
                 return kernel(advance, parts, task, starts, self.cycles, self.phases, budget, states)
 
-            code = plan.called(more, *memory)
+            code = plan.called(more, *changed)
             i, resumed = starts.reached, starts.resumed
             if code == codes.REFUSED:
                 # Python finds a mode where a guard of another one is not finite, takes steps in time where

@@ -112,7 +112,7 @@ def outcome_of(result: Any) -> Outcome:
             values.append(value)
             continue
         column, kind = _column(name, value)
-        signature.append((name, np.shape(column), kind))
+        signature.append((name, getattr(column, "shape", ()), kind))
         values.append(column)
     return Outcome(_schema(tuple(signature)), values, status)
 
@@ -132,6 +132,8 @@ def _column(name: str, value: Any) -> tuple[Any, str]:
     """A value as floats, complex numbers or text, and which."""
     if isinstance(value, str):
         return value, "s"
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value, "f"
     try:
         found = np.asarray(value)
     except ValueError:

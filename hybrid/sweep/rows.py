@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from functools import cached_property
 from typing import Any, Literal, TypeVar
 
 import attrs
@@ -18,12 +19,12 @@ from hybrid.orbits.sections import crossings, strobe
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.labelled import Names
 from hybrid.simulation.plan import check_solver, plan_of
-from hybrid.simulation.trajectory import Trajectory, start
+from hybrid.simulation.trajectory import Common, Trajectory, explore
 from hybrid.solvers import Solver
 from hybrid.sweep.points import as_points
 from hybrid.sweep.sheet import Labels
 from hybrid.system.elements import Guard
-from hybrid.system.graph import HybridSystem, as_system, check_mode
+from hybrid.system.graph import HybridSystem, as_system, check_mode, starting_mode
 from hybrid.system.growth import Unexplored
 from hybrid.system.labels import by_label, named, plain_name
 from hybrid.transform.markers import with_section
@@ -61,8 +62,8 @@ class Rows:
     at: At
     marked: HybridSystem
     along: str | None
-    # Stages of a growing system, with the markers of a surface.
-    _stages: dict[int, tuple[HybridSystem, HybridSystem]] = attrs.field(factory=dict, init=False, repr=False)
+    # The rows on each stage of a growing system.
+    _stages: dict[int, Rows] = attrs.field(factory=dict, init=False, repr=False)
 
     def grown(self, work: Callable[[Rows], R]) -> R:
         """The result of some work, repeated until the system has all modes that the work needs."""
@@ -76,11 +77,11 @@ class Rows:
 
     def _with(self, stage: HybridSystem) -> Rows:
         """The rows on a stage of a growing system; stages are kept, as they hold what is compiled."""
-        marked = self._stages.get(id(stage))
-        if marked is None or marked[0] is not stage:
-            new = with_section(stage, self.at) if isinstance(self.at, Guard) else stage
-            marked = self._stages[id(stage)] = stage, new
-        return attrs.evolve(self, system=stage, marked=marked[1])
+        rows = self._stages.get(id(stage))
+        if rows is None or rows.system is not stage:
+            marked = with_section(stage, self.at) if isinstance(self.at, Guard) else stage
+            rows = self._stages[id(stage)] = attrs.evolve(self, system=stage, marked=marked)
+        return rows
 
     def prepare(self, tangents: int) -> None:
         """Compile and load all that the rows need, so that threads do not do so at the same time."""
@@ -112,17 +113,26 @@ class Rows:
         t0: float,
     ) -> Trajectory:
         """A trajectory from a place."""
-        values = {name: value for name, value in point.items() if name not in self.starts}
-        state, mode = place
-        return start(
-            system,
-            state,
-            t0,
-            mode=mode,
-            parameters={**self.parameters, **values},
-            solver=self.solver,
-            tangent=tangent,
-        )
+        state, values = place[0], self.values(point)
+        mode = starting_mode(system, place[1])
+        explore(system, t0, state, values, mode)
+        return Common(compile_system(system), self.solver, tangent, t0).begin_at(state, mode, values)
+
+    def values(self, point: Mapping[str, float]) -> np.ndarray:
+        """The parameter vector of a row."""
+        values = self._values.copy()
+        for name, value in point.items():
+            if name not in self.starts:
+                values[self._place[plain_name(name)]] = value
+        return values
+
+    @cached_property
+    def _values(self) -> np.ndarray:
+        return self.system.parameter_values(self.parameters)
+
+    @cached_property
+    def _place(self) -> dict[str, int]:
+        return {name: i for i, name in enumerate(self.system.variables.parameter_names)}
 
     def origin(self, point: Mapping[str, float]) -> np.ndarray:
         """The start of a row that does not go on from another row."""

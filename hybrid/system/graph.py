@@ -321,10 +321,22 @@ class HybridSystem(Portable):
 
     def parts_of(self, name: str) -> list[int]:
         """Indices of the modes that are parts of a mode, or of the one mode of that name."""
-        if not isinstance(name, str):
-            return [self.mode_index(name)]
-        parts = [i for i, mode in enumerate(self.modes) if name in (mode.name, mode.part_of)]
-        return parts or [self.mode_index(name)]
+        parts = self._parts.get(name) if isinstance(name, str) else None
+        return [self.mode_index(name)] if parts is None else list(parts)
+
+    @cached_property
+    def _parts(self) -> dict[str, list[int]]:
+        """Indices of the modes by their names, and by the names of what they are parts of."""
+        found: dict[str, list[int]] = {}
+        for i, mode in enumerate(self.modes):
+            for name in filter(None, dict.fromkeys((mode.name, mode.part_of))):
+                found.setdefault(name, []).append(i)
+        return found
+
+    @cached_property
+    def whole_modes(self) -> tuple[str, ...]:
+        """Names of the modes before the system was split, in order."""
+        return tuple(dict.fromkeys(mode.part_of or mode.name for mode in self.modes))
 
     def copies_of(self, name: str) -> list[int]:
         """Indices of the transitions that are copies of a transition, or of the one of that name."""

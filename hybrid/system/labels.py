@@ -12,6 +12,9 @@ import numpy as np
 from hybrid import arguments
 from hybrid.errors import ArgumentError
 
+# Values of these types are read by position.
+UNLABELLED = {tuple, list, np.ndarray}
+
 
 def plain_name(name: Any) -> Any:
     """A name as Python reads it in source text (NFKC); anything else as it is."""
@@ -34,6 +37,8 @@ def by_label(name: str, value: Any) -> dict[Any, Any] | None:
     ArgumentError
         If a label is given twice, or labels are neither texts nor the positions in order.
     """
+    if type(value) in UNLABELLED:
+        return None
     if isinstance(value, Mapping):
         inner = named(name, value).items()
         return {label: each if _labels_of(each) is None else np.asarray(each) for label, each in inner}

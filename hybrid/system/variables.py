@@ -208,7 +208,11 @@ class Variables:
 
     def parameter_view(self, values: Iterable[Any]) -> Any:
         """The parameters as model functions get them, by name."""
-        return named_values(PARAMETERS, self.parameter_names, values)
+        return self._parameter_class._make(values)
+
+    @cached_property
+    def _parameter_class(self) -> type[Any]:
+        return _explaining_class(PARAMETERS, self.parameter_names)
 
     def described(self, t: float, x: np.ndarray, values: np.ndarray) -> str:
         """Text for a point, with the parameters that differ from their defaults."""

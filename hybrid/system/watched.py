@@ -51,13 +51,20 @@ class Watched:
 
     def holds(self) -> bool:
         """Whether all values are still what they were. This takes some microseconds, longer for tables."""
-        return (
-            all(_same(_content(cell), value) for cell, _, value in self._cells)
-            and all(_same(names.get(name, MISSING), value) for names, name, value in self._items)
-            and all(_same(getattr(owner, name, MISSING), value) for owner, name, value in self._attributes)
-            and all(array.tobytes() == content for array, content in self._arrays)
-            and all(_same_items(_items(value), content) for value, content in self._lists)
-        )
+        # Loops, as every run asks: over an empty list they cost nothing.
+        for cell, _, value in self._cells:
+            if not _same(_content(cell), value):
+                return False
+        for names, name, value in self._items:
+            if not _same(names.get(name, MISSING), value):
+                return False
+        for owner, name, value in self._attributes:
+            if not _same(getattr(owner, name, MISSING), value):
+                return False
+        for array, content in self._arrays:
+            if array.tobytes() != content:
+                return False
+        return not self._lists or all(_same_items(_items(held), items) for held, items in self._lists)
 
     def numbers(self) -> dict[str, float]:
         """The plain numbers that were read from modules and closures, by name."""

@@ -6,20 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hybrid.accuracy.averages import MAX_BATCHES, standard_error, standard_error_from_batches
-from lyapunov.batches import closed_batch_means, new_batches, push
+from lyapunov.batches import EMPTY, closed_batch_means, push
 from tests.hybrid.accuracy.test_averages import autoregressive
 
 
-def test_an_accumulator_begins_with_batches_of_one_value():
-    sums, state = new_batches(3)
-    assert sums.shape == (MAX_BATCHES, 3)
-    assert not sums.any()
-    assert state.tolist() == [0, 1, 0]
-
-
 def accumulate(series, batches, add=push):
-    sums, state = new_batches(series.shape[1])
-    sums = sums[:batches]
+    # What the sums hold at first does not count.
+    sums, state = np.full((batches, series.shape[1]), np.nan), np.array(EMPTY)
     for row in series:
         add(sums, state, row)
     return sums, state

@@ -63,6 +63,36 @@ def test_rows_are_the_spectra_one_by_one():
         assert (chart.mode_end[i], chart.status[i]) == (row.mode, row.status.code)
 
 
+@pytest.mark.parametrize("section", [0, 3])
+def test_a_row_leaves_nothing_to_the_next(section):
+    """Rows take over memory and model of the rows before, also of those that fail or start elsewhere."""
+    tank = hybrid.HybridSystem(
+        state=("h", "s"),
+        parameters={"c": 0.3, "w": 2.0},
+        modes=[hybrid.Mode("on", lambda t, x, p: (np.cos(p.w * t) - p.c * x.h * x.s, np.sin(x.h) - x.s))],
+        transitions=[
+            hybrid.Transition(
+                "on",
+                "on",
+                hybrid.Guard(lambda t, x, p: np.sin(x.h) - p.c, 1),
+                hybrid.Reset(lambda t, x, p: (x.h - 0.5, x.s)),
+            )
+        ],
+        period=lambda p: 2 * np.pi / p.w,
+    )
+    options = {"transient": 2, "intervals": 6, "k": 2, "section": section, "executor": 1}
+    over = {"c": [0.3, 0.0, 0.7], "w": [2.0, 0.0, 3.0], "h": [0.0, 2.0]}
+    forth = lyapunov.chart(tank, over, (0.0, 0.1), **options)
+    back = lyapunov.chart(tank, {name: values[::-1] for name, values in over.items()}, (0.0, 0.1), **options)
+    assert_same(forth, back.isel({name: slice(None, None, -1) for name in over}))
+    assert (forth.status.sel(w=0.0) == StatusCode.FAILED).all()
+    assert ok(forth.sel(w=[2.0, 3.0])).any()
+    single = lyapunov.lyapunov_spectrum(
+        tank, (2.0, 0.1), parameters={"c": 0.7, "w": 3.0}, transient=2, intervals=6
+    )
+    np.testing.assert_array_equal(forth.exponents.sel(c=0.7, w=3.0, h=2.0), single.exponents)
+
+
 def test_a_chart_follows_the_closed_form():
     """The larger multiplier of the orbits with one impact per period, as the damping varies."""
     values = np.array([0.1, 0.15, 0.2, 0.3])

@@ -19,7 +19,6 @@ from hybrid.kernels.types.kinds import (
     SEVERAL,
     TRUTH,
     Array,
-    Number,
     kind_named,
     text_of,
     width_of,
@@ -70,25 +69,26 @@ class Kernel:
 
     def __init__(self, name: str, code: Code, result: str, arguments: list[str]) -> None:
         self.name, self._code, self._result = name, code, result
-        kinds = [kind_named(each) for each in arguments]
-        # How each argument is converted: an address has None, and numbers are left to the table.
-        self._converters = [
-            words_of(f"argument {i} of {name}", kind) if isinstance(kind, Array) else kind
-            for i, kind in enumerate(kinds)
-        ]
-        self._table = struct.Struct("".join("d" if kind == REAL else width_of(kind) * "q" for kind in kinds))
+        self._kinds = [kind_named(each) for each in arguments]
 
     def __call__(self, *values: Any) -> Any:
         """Call the kernel; arrays are passed by their addresses."""
-        words: list[Any] = []
-        for value, converter in zip(values, self._converters, strict=True):
-            if converter is None:
-                words.append(value.address)
-            elif isinstance(converter, Number):
-                words.append(value)
+        return self._read(self._call(self._packed(*values)))
+
+    @cached_property
+    def _packed(self) -> Any:
+        """The table of words as a function of the arguments: one expression, because calls are frequent."""
+        form, words, scope = "", [], dict[str, Any]()
+        for i, kind in enumerate(self._kinds):
+            form += "d" if kind == REAL else width_of(kind) * "q"
+            if isinstance(kind, Array):
+                scope[f"words_{i}"] = words_of(f"argument {i} of {self.name}", kind)
+                words.append(f"*words_{i}(a{i})")
             else:
-                words += converter(value)
-        return self._read(self._call(self._table.pack(*words)))
+                words.append(f"a{i}.address" if kind is None else f"a{i}")
+        scope["pack"] = struct.Struct(form).pack
+        names = ", ".join(f"a{i}" for i in range(len(self._kinds)))
+        return eval(f"lambda {names}: pack({', '.join(words)})", scope)
 
     @cached_property
     def address(self) -> int:

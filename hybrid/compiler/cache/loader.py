@@ -112,7 +112,7 @@ def loaded(module: str) -> SimpleNamespace:
 def compiled(module: str) -> bytes:
     """Compile the kernels that a module exports; the contents of their file."""
     import_numba()
-    from hybrid.kernels.types.export import exports_of, object_code
+    from hybrid.kernels.types.numba_door.export import exports_of, object_code
 
     with between_passes(), _without_collection():
         exports = exports_of(importlib.import_module(module))
@@ -137,22 +137,12 @@ def _without_collection() -> Iterator[None]:
 
 @cache
 def import_numba() -> None:
-    """Import numba's array functions without SciPy's linear algebra, which kernels do not need.
-
-    On import, the array functions look for SciPy's BLAS, which takes a fifth of a second. BLAS is available,
-    since this package requires SciPy; functions that call BLAS look for it again.
-    """
+    """Import numba, for the processor that the kernels are compiled for."""
     if os.environ.get("HYBRID_CPU"):
         os.environ["NUMBA_CPU_NAME"], os.environ["NUMBA_CPU_FEATURES"] = cpu()
-    from numba.np import linalg
+    from hybrid.kernels.types.numba_door.session import import_array_functions
 
-    look = linalg.ensure_blas
-    linalg.ensure_blas = lambda: None
-    try:
-        from numba.np import arraymath
-    finally:
-        linalg.ensure_blas = look
-    vars(arraymath)["ensure_blas"] = look
+    import_array_functions()
 
 
 def _path(module: str) -> Path:

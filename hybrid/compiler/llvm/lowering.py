@@ -15,25 +15,26 @@ from typing import Any, ClassVar
 import attrs
 from llvmlite import ir
 
-from hybrid.compiler.llvm.builder import Builder
 from hybrid.compiler.llvm.calls import CALLS, NUMBER, WHOLE, Call
 from hybrid.kernels.instructions.loops import loop
 from hybrid.kernels.instructions.registers import Matrix, everywhere, vector_of
 from hybrid.kernels.types.codes import NARROW
+from hybrid.kernels.types.numba_door.builder import Builder
 from hybrid.symbolic.branches import PARSER
 
 TRUTH = ir.IntType(1)
+ADDRESS = ir.PointerType()
 LANES = vector_of(NARROW)
 # Numba's structure of an array of floats: memory info, parent, number of items, bytes per item, data, shape,
 # strides.
 ARRAYS = {
     axes: ir.LiteralStructType(
         [
-            ir.IntType(8).as_pointer(),
-            ir.IntType(8).as_pointer(),
+            ADDRESS,
+            ADDRESS,
             WHOLE,
             WHOLE,
-            NUMBER.as_pointer(),
+            ADDRESS,
             ir.ArrayType(WHOLE, axes),
             ir.ArrayType(WHOLE, axes),
         ]
@@ -202,7 +203,7 @@ class _Body:
         variable = self.variables.get(name)
         if variable is None:
             variable = self.variables[name] = self.front.alloca(value.type, name=name)
-        kept = variable.type.pointee
+        kept = variable.allocated_type
         if kept == NUMBER:
             value = self.number(value)
         if kept != value.type:
@@ -278,13 +279,13 @@ class _Body:
         array, index = self.value(node.value), self.value(node.slice)
         if isinstance(array, Matrix):
             return array.address(*index)
-        return self.builder.gep(array.data, [index])
+        return self.builder.gep(array.data, [index], source_etype=NUMBER)
 
     def _subscript(self, node: ast.Subscript) -> Any:
         value = self.value(node.value)
         if isinstance(value, tuple):
             return value[ast.literal_eval(node.slice)]
-        return self.builder.load(self._place(node))
+        return self.builder.load(self._place(node), typ=NUMBER)
 
     def _negative(self, node: ast.UnaryOp) -> Any:
         if not isinstance(node.op, ast.USub):
@@ -374,8 +375,9 @@ class _Body:
             return array.length
         known = self.calls.get(name)
         if isinstance(known, CaseTable):
-            table = self.builder.inttoptr(WHOLE(known.address), WHOLE.as_pointer())
-            address = self.builder.load(self.builder.gep(table, [self.arguments["index"]]))
+            table = self.builder.inttoptr(WHOLE(known.address), ADDRESS)
+            place = self.builder.gep(table, [self.arguments["index"]], source_etype=WHOLE)
+            address = self.builder.load(place, typ=WHOLE)
             return self._called(address, [*self.arguments.values()])
         if known is not None:
             return self._own_call(known, node.args)
@@ -393,17 +395,18 @@ class _Body:
         numbers = self.front.alloca(NUMBER, WHOLE(function.size))
         row = ARRAYS[1](ir.Undefined)
         size, width = WHOLE(function.size), WHOLE(8)
-        nobody = ir.IntType(8).as_pointer()(None)
+        nobody = ADDRESS(None)
         for place, part in enumerate((nobody, nobody, size, width, numbers)):
             row = self.builder.insert_value(row, part, place)
         for place, part in ((SHAPE, size), (SHAPE + 1, width)):
             row = self.builder.insert_value(row, part, [place, 0])
         arguments.append(row)
         self._called(WHOLE(function.address), arguments)
-        return tuple(self.builder.load(self.builder.gep(numbers, [WHOLE(i)])) for i in range(function.size))
+        places = [self.builder.gep(numbers, [WHOLE(i)], source_etype=NUMBER) for i in range(function.size)]
+        return tuple(self.builder.load(place, typ=NUMBER) for place in places)
 
     def _called(self, address: Any, arguments: Sequence[Any]) -> None:
-        """A call of machine code of this process."""
+        """A call of machine code of this process; llvmlite still asks its address for the signature."""
         kind = ir.FunctionType(ir.VoidType(), [each.type for each in arguments])
         self.builder.call(self.builder.inttoptr(address, kind.as_pointer()), arguments)
 

@@ -8,11 +8,11 @@ one vector data that it has just written as several. So the columns of the state
 
 import numpy as np
 from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic, overload
+from numba.extending import overload
 
 from hybrid.kernels.arithmetic.lanes import HERE, matrix_of
 from hybrid.kernels.instructions.registers import (
+    NUMBER,
     built_in,
     everywhere,
     multiply_add,
@@ -21,6 +21,13 @@ from hybrid.kernels.instructions.registers import (
     write,
 )
 from hybrid.kernels.types.codes import NARROW, WIDE
+from hybrid.kernels.types.numba_door.building import (
+    alloca_once_value,
+    for_range,
+    for_range_slice,
+    intrinsic,
+    unpack_tuple,
+)
 
 
 def convolve(series, order, inset, left, first, width, widest):
@@ -138,18 +145,20 @@ def _gather(typing_context, series, order, n, first, stride, y):
         matrix, order, n, first, stride, vector = arguments
         rows = matrix_of(context, builder, series, matrix)
         target = context.make_array(y)(context, builder, vector)
-        [length] = cgutils.unpack_tuple(builder, target.shape)
+        [length] = unpack_tuple(builder, target.shape)
         number = n.type
         lanes = number(NARROW)
         count = builder.sub(builder.sdiv(length, n), number(1))
-        with cgutils.for_range(builder, count, intp=number) as each:
+        with for_range(builder, count, intp=number) as each:
             block, lane = builder.sdiv(each.index, lanes), builder.srem(each.index, lanes)
             column = builder.add(builder.add(first, builder.mul(block, stride)), lane)
             source = rows.address(order, column)
-            begin = builder.gep(target.data, [builder.mul(n, builder.add(each.index, number(1)))])
-            with cgutils.for_range(builder, n, intp=number) as component:
-                value = builder.load(builder.gep(source, [builder.mul(component.index, lanes)]))
-                builder.store(value, builder.gep(begin, [component.index]))
+            ahead = builder.mul(n, builder.add(each.index, number(1)))
+            begin = builder.gep(target.data, [ahead], source_etype=NUMBER)
+            with for_range(builder, n, intp=number) as component:
+                place = builder.gep(source, [builder.mul(component.index, lanes)], source_etype=NUMBER)
+                value = builder.load(place, typ=NUMBER)
+                builder.store(value, builder.gep(begin, [component.index], source_etype=NUMBER))
         return context.get_dummy_value()
 
     return types.void(series, types.intp, types.intp, types.intp, types.intp, y), generate
@@ -216,7 +225,7 @@ def _evaluate_in_registers(typing_context, series, order, s, first, width, lanes
             walker = rows.walker(order, column)
             # One sum begins with the last term, the other with the last but one.
             last, other = (
-                [cgutils.alloca_once_value(builder, term) for term in terms_of(rows.walk(walker, -1))]
+                [alloca_once_value(builder, term) for term in terms_of(rows.walk(walker, -1))]
                 for _ in range(2)
             )
 
@@ -224,7 +233,7 @@ def _evaluate_in_registers(typing_context, series, order, s, first, width, lanes
                 for total, term in zip(totals, terms_of(rows.walk(walker, -1)), strict=True):
                     builder.store(multiply_add(builder, builder.load(total), square, term), total)
 
-            with cgutils.for_range(builder, pairs, intp=number):
+            with for_range(builder, pairs, intp=number):
                 add_terms(last)
                 add_terms(other)
             with builder.if_then(is_even):
@@ -240,7 +249,7 @@ def _evaluate_in_registers(typing_context, series, order, s, first, width, lanes
 
         end = builder.add(first, width)
         turn = number(lanes * at_once)
-        with cgutils.for_range_slice(builder, first, end, turn, number) as (column, _):
+        with for_range_slice(builder, first, end, turn, number) as (column, _):
             one_turn(column)
         return context.get_dummy_value()
 

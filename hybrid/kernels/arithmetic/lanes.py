@@ -4,12 +4,12 @@ In plain Python ``Lanes`` are arrays ``(4,)``, so the same code runs compiled an
 """
 
 import operator
+from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic, models, overload, register_jitable, register_model
+from numba.extending import models, overload, register_jitable, register_model
 
 from hybrid.kernels.instructions.registers import (
     FUSED,
@@ -23,10 +23,11 @@ from hybrid.kernels.instructions.registers import (
     write,
 )
 from hybrid.kernels.types.codes import NARROW
-from hybrid.kernels.types.part_compiler import PartCompiler
+from hybrid.kernels.types.numba_door.building import intrinsic, unpack_tuple
+from hybrid.kernels.types.numba_door.part_compiler import PartCompiler
 
 # These functions are small and run at every order: without inlining, the call would cost as much as the work.
-HERE = {
+HERE: Any = {
     "_nrt": False,
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,
@@ -56,7 +57,7 @@ class _Register(models.PrimitiveModel):
 def matrix_of(context, builder, kind, matrix):
     """The ``Matrix`` of a numba array."""
     array = context.make_array(kind)(context, builder, matrix)
-    return Matrix(builder, array.data, cgutils.unpack_tuple(builder, array.shape)[1])
+    return Matrix(builder, array.data, unpack_tuple(builder, array.shape)[1])
 
 
 def load(matrix, row, column):

@@ -2,11 +2,11 @@
 
 from llvmlite import ir
 from numba import njit, types
-from numba.extending import intrinsic
 
 from hybrid.kernels.arithmetic.lanes import LANES
 from hybrid.kernels.instructions.registers import vector_of
 from hybrid.kernels.types.codes import NARROW
+from hybrid.kernels.types.numba_door.building import intrinsic
 from hybrid.kernels.types.options import INLINE
 
 # A float is ``2 ** (exponent - BIAS)`` times its mantissa; the mantissa is in the lower bits.

@@ -3,7 +3,7 @@
 from llvmlite import ir
 
 from hybrid.kernels.instructions.loops import loop, variable
-from hybrid.kernels.instructions.registers import everywhere, multiply_add, read, vector_of, write
+from hybrid.kernels.instructions.registers import NUMBER, everywhere, multiply_add, read, vector_of, write
 from hybrid.kernels.types.codes import NARROW, WIDE
 
 # Number of partial sums: in one sum, each term waits for the previous term. All sums together take at most
@@ -58,7 +58,7 @@ def _convolution(builder, rows, order, inset, left, first, width, widest, pairs)
             if pairs:
                 times = read(builder, rows.beside(a, place), each)
             else:
-                times = everywhere(builder, builder.load(a), each)
+                times = everywhere(builder, builder.load(a, typ=NUMBER), each)
             builder.store(multiply_add(builder, times, term, builder.load(total)), total)
 
     terms = builder.add(builder.sub(order, builder.add(inset, inset)), number(1))
@@ -88,7 +88,8 @@ def write_ends(builder, rows, order, left, first, width, widest, pairs=False):
         if pairs:
             low, high = (read(builder, rows.beside(each, place), lanes) for each in (left_one, left_last))
         else:
-            low, high = (everywhere(builder, builder.load(each), lanes) for each in (left_one, left_last))
+            ends = (builder.load(each, typ=NUMBER) for each in (left_one, left_last))
+            low, high = (everywhere(builder, each, lanes) for each in ends)
         high = builder.select(differ, high, nothing)
         total = read(builder, rows.beside(here, place), lanes)
         total = multiply_add(builder, high, read(builder, rows.beside(one, place), lanes), total)
@@ -125,7 +126,7 @@ def write_combination_of_tangents(builder, rows, order, table, width, first, n):
     with loop(builder, number(0), order, number(1)):
         here, there = rows.walk(target, 1), rows.walk(source, 1)
         for i in range(n):
-            entries = [builder.load(rows.beside(there, width * j + i)) for j in range(n)]
+            entries = [builder.load(rows.beside(there, width * j + i), typ=NUMBER) for j in range(n)]
             factors = [everywhere(builder, entry, NARROW) for entry in entries]
             write(builder, _weighted_sum(builder, factors, vectors), rows.beside(here, NARROW * i))
 
@@ -141,8 +142,9 @@ def write_spread(builder, y, length, n, rows, first, stride):
             is_one = builder.icmp_signed("<", vector, count)
             column = builder.add(builder.add(first, builder.mul(group, stride)), number(lane))
             source = builder.select(is_one, builder.mul(number(n), builder.add(vector, number(1))), number(0))
-            start, target = builder.gep(y, [source]), rows.address(number(0), column)
+            start = builder.gep(y, [source], source_etype=NUMBER)
+            target = rows.address(number(0), column)
             for i in range(n):
-                value = builder.load(builder.gep(start, [number(i)]))
+                value = builder.load(builder.gep(start, [number(i)], source_etype=NUMBER), typ=NUMBER)
                 value = builder.select(is_one, value, value.type(0.0))
                 builder.store(value, rows.beside(target, NARROW * i))

@@ -6,11 +6,12 @@ from hybrid.kernels.instructions.loops import declared, variable
 from hybrid.kernels.types.codes import NARROW, WIDE
 
 FUSED = ("contract",)
+NUMBER = ir.DoubleType()
 
 
 def vector_of(width):
     """The type of a register of ``width`` numbers."""
-    return ir.VectorType(ir.DoubleType(), width)
+    return ir.VectorType(NUMBER, width)
 
 
 def everywhere(builder, number, width):
@@ -42,7 +43,8 @@ class Matrix:
     def address(self, row, column):
         """Address of an entry."""
         builder = self.builder
-        return builder.gep(self.data, [builder.add(builder.mul(row, self.columns), column)])
+        place = builder.add(builder.mul(row, self.columns), column)
+        return builder.gep(self.data, [place], source_etype=NUMBER)
 
     def walker(self, row, column):
         """A variable that holds the address of an entry."""
@@ -52,22 +54,28 @@ class Matrix:
         """Move a walker on by a number of rows; returns the address that it held."""
         builder = self.builder
         here = builder.load(walker)
-        builder.store(builder.gep(here, [builder.mul(self.columns, self.columns.type(rows))]), walker)
+        further = builder.mul(self.columns, self.columns.type(rows))
+        builder.store(builder.gep(here, [further], source_etype=NUMBER), walker)
         return here
 
     def beside(self, address, columns):
         """Address of the entry ``columns`` further in the same row."""
-        return self.builder.gep(address, [self.columns.type(columns)])
+        return self.builder.gep(address, [self.columns.type(columns)], source_etype=NUMBER)
 
 
 def read(builder, address, width):
     """The vector at an address."""
-    return builder.load(builder.bitcast(address, vector_of(width).as_pointer()), align=8)
+    return builder.load(address, align=8, typ=vector_of(width))
 
 
 def write(builder, vector, address):
     """Store a vector at an address."""
-    builder.store(vector, builder.bitcast(address, vector.type.as_pointer()), align=8)
+    builder.store(vector, _address_of(builder, address, vector.type), align=8)
+
+
+def _address_of(builder, address, kind):
+    """An address as that of values of a type: the pointers that come from numba know what they point to."""
+    return builder.bitcast(address, kind.as_pointer())
 
 
 def write_down(builder, matrix, row, column, stride, lanes):
@@ -75,7 +83,7 @@ def write_down(builder, matrix, row, column, stride, lanes):
     address = matrix.address(row, column)
     for lane in range(NARROW):
         builder.store(builder.extract_element(lanes, ir.IntType(32)(lane)), address)
-        address = builder.gep(address, [stride])
+        address = builder.gep(address, [stride], source_etype=NUMBER)
 
 
 def write_row(builder, matrix, row, column, numbers):
@@ -88,7 +96,7 @@ def write_row(builder, matrix, row, column, numbers):
         vector = vector_of(NARROW)([0.0] * NARROW)
         for lane, value in enumerate(numbers[place : place + NARROW]):
             vector = builder.insert_element(vector, value, ir.IntType(32)(lane))
-        target = builder.bitcast(matrix.beside(address, place), vector.type.as_pointer())
+        target = _address_of(builder, matrix.beside(address, place), vector.type)
         builder.store(vector, target, align=8, whole=True)
 
 

@@ -34,7 +34,7 @@ class Function(NamedTuple):
     """A function: the kind of its result, None if there is none, and the kinds of its arguments."""
 
     result: Any
-    arguments: tuple
+    arguments: tuple[Any, ...]
 
 
 INTEGER, REAL, TRUTH = Number("int64"), Number("float64"), Number("bool")

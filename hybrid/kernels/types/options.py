@@ -3,15 +3,17 @@
 ``export`` makes machine code of the kernels that Python calls or hands to other kernels.
 """
 
+from typing import Any
+
 from numba import njit
 
-import hybrid.kernels.types.numba_types  # noqa: F401 (so that kernels may take structures)
-from hybrid.kernels.types.part_compiler import PartCompiler
+import hybrid.kernels.types.numba_door.numba_types  # noqa: F401 (so that kernels may take structures)
+from hybrid.kernels.types.numba_door.part_compiler import PartCompiler
 
 # Sums may be reordered and fused, but nan and infinity keep their meaning in comparisons (``math.isfinite``
 # takes the difference of a number and itself, which may be taken for zero). Kernels allocate nothing and own
 # nothing, so no references are counted.
-KERNEL = {
+KERNEL: dict[str, Any] = {
     "error_model": "numpy",
     "fastmath": {"contract", "reassoc", "nsz"},
     "_nrt": False,
@@ -20,7 +22,7 @@ KERNEL = {
     "pipeline_class": PartCompiler,
 }
 # Small and called at every stage: the call would cost as much as the work.
-INLINE = KERNEL | {"forceinline": True}
+INLINE: dict[str, Any] = KERNEL | {"forceinline": True}
 
 
 def exported(result, *arguments):

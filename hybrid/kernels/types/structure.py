@@ -13,6 +13,7 @@ Structures that are made again and again, with other numbers in arrays of the sa
 import math
 from ctypes import addressof, c_char
 from itertools import accumulate
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -35,6 +36,13 @@ class Structure:
     after ``class Run(Structure, counters=("mode", "cycle"))``, ``run.mode`` reads and writes
     ``run.counters[0]``, in a kernel and in Python. The columns of a matrix have names in the same way.
     """
+
+    # What is found of each class: the kinds of its fields, the field and the place of each named entry, how a
+    # field becomes words, and where its words begin.
+    _fields: ClassVar[dict[str, Any]]
+    _entries: ClassVar[dict[str, tuple[str, int]]]
+    _words: ClassVar[dict[str, Any]]
+    _places: ClassVar[dict[str, int]]
 
     def __init_subclass__(cls, **named_entries):
         """Find the place of each field from the annotations, and the fields of the named entries."""
@@ -80,25 +88,25 @@ class Structure:
         self._memory[:] = saved
 
     def __setattr__(self, name, value):
-        entry = self._entries.get(name)
-        if entry is not None:
-            array = getattr(self, entry[0])
-            array[entry[1] if array.ndim == 1 else (slice(None), entry[1])] = value
-            return
-        raise AttributeError(f"{type(self).__name__}.{name} is fixed; replace({name}=...) makes a copy.")
+        if name not in self._entries:
+            raise AttributeError(f"{type(self).__name__}.{name} is fixed; replace({name}=...) makes a copy.")
+        object.__setattr__(self, name, value)
+
+    def put(self, **numbers):
+        """Set numbers, between calls of kernels; for an owner who shares the structure with nobody."""
+        for name, value in numbers.items():
+            [self.table[self._places[name]]] = self._words[name](value)
+        self.__dict__.update(numbers)
 
     def replace(self, **changes):
         """A copy with some fields changed."""
         copy, table = object.__new__(type(self)), self.table.copy()
         copy.__dict__.update(self.__dict__)
         for name, value in changes.items():
-            place, words = self._places[name], self._words[name](value)
-            if len(words) == 1:
-                # Ten times as fast as a slice.
-                table[place] = words[0]
-            else:
-                table[place : place + len(words)] = words
-            copy.__dict__[name] = value
+            # Word by word: ten times as fast as a slice.
+            for place, word in enumerate(self._words[name](value), self._places[name]):
+                table[place] = word
+        copy.__dict__.update(changes)
         copy._fill(table)
         return copy
 
@@ -124,7 +132,9 @@ class Layout:
         self.kind, self.shared = kind, shared
         fields = kind._fields
         _check_fields(kind, [*shapes, *shared])
-        table, moving, offsets, end = [], [], {}, 0
+        table: list[int] = []
+        moving: list[bool] = []
+        offsets, end = {}, 0
         for name in fields:
             if name in shapes:
                 offsets[name] = end
@@ -137,6 +147,7 @@ class Layout:
         # The table itself comes first. An offset becomes an address when the block's own is added.
         head = _whole_lines(len(table) * WORD)
         self.spares = []
+        self.first = None
         self.head = head
         self.moving = np.array(moving, dtype=np.int64)
         self.table = np.array(table, dtype=np.int64) + head * self.moving
@@ -148,11 +159,21 @@ class Layout:
 
     def zeros(self):
         """A structure whose arrays are zero."""
-        spare = self._spare()
-        if spare is None:
-            return self._structure_in(np.zeros(self.length + LINE, dtype=np.uint8))
-        spare._memory[spare._begin + self.head :] = 0
-        return spare
+        structure = self.unwritten()
+        self.clear(structure)
+        return structure
+
+    def clear(self, structure):
+        """Make the arrays of a structure zero."""
+        structure._memory[self._places_of(structure)] = 0
+
+    def begin_as(self, structure):
+        """Let ``renew`` give arrays what those of this structure hold now."""
+        self.first = structure._memory[self._places_of(structure)].copy()
+
+    def renew(self, structure):
+        """Let the arrays of a structure hold what ``begin_as`` was given."""
+        structure._memory[self._places_of(structure)] = self.first
 
     def unwritten(self):
         """A structure whose arrays hold what the memory held: for those who write before they read."""
@@ -160,13 +181,16 @@ class Layout:
 
     def words(self, structure):
         """What the arrays of a structure hold, as one array of words that is a view."""
-        begin = structure._begin
-        return structure._memory[begin + self.head : begin + self.length].view(np.int64)
+        return structure._memory[self._places_of(structure)].view(np.int64)
 
     def take_back(self, structure):
         """Keep a structure of this layout that nobody else holds any more, nor any of its arrays."""
         if len(self.spares) < MOST_SPARES:
             self.spares.append(structure)
+
+    def _places_of(self, structure):
+        """Where the arrays of a structure lie in its memory, behind the table."""
+        return slice(structure._begin + self.head, structure._begin + self.length)
 
     def _spare(self):
         try:
@@ -189,10 +213,15 @@ class Layout:
 
 
 def _entry(field, index, ndim):
-    """The property that reads a named entry of an array field."""
+    """The property of a named entry of an array field: a number, or a column of a matrix."""
+    place = index if ndim == 1 else (slice(None), index)
+
+    def write(structure, value):
+        getattr(structure, field)[place] = value
+
     if ndim > 1:
-        return property(lambda structure: getattr(structure, field)[:, index])
-    return property(lambda structure: getattr(structure, field).item(index))
+        return property(lambda structure: getattr(structure, field)[place], write)
+    return property(lambda structure: getattr(structure, field).item(index), write)
 
 
 def _check_fields(kind, given):

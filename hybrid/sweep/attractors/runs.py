@@ -15,7 +15,7 @@ from hybrid.errors import ArgumentError
 from hybrid.kernels.types import attractors as kernel_types
 from hybrid.kernels.types import codes
 from hybrid.simulation.interrupt import CTRL_C, Bursts
-from hybrid.simulation.memory import fresh_run, fresh_work, starts_of
+from hybrid.simulation.memory import starts_of
 from hybrid.simulation.plan import plan_of
 from hybrid.simulation.trajectory import Trajectory
 from hybrid.status import StatusCode
@@ -72,11 +72,11 @@ class Runs:
         if not len(origins) or CTRL_C.is_set():
             return
         plan, solver = self.plan, self.setup.solver
-        run, phase0 = fresh_run(plan.run_layout, self.model, origins[0], None, self.setup.t0)
-        work = fresh_work(plan.work_layout, plan.method)
-        trajectory = Trajectory(self.compiled, plan, self.model, run, work, 0, solver.max_steps, phase0)
+        memory = plan.memory()
+        phase0 = memory.begin(self.model, origins[0], None, self.setup.t0)
+        trajectory = Trajectory(self.compiled, plan, self.model, memory, 0, solver.max_steps, phase0)
         limits = {"max_steps": solver.max_steps, "max_jumps": codes.UNLIMITED}
-        starts = starts_of(plan, run, work, origins, named=self.named, found=found, **limits)
+        starts = starts_of(memory, origins, named=self.named, found=found, **limits)
         task = trajectory.task(trajectory.no_record())
         section, progress = self.section(phase0, most), self.progress(trajectory)
         kernel, advance = load_kernels("hybrid.kernels.events.settle").settle, load_kernels().advance

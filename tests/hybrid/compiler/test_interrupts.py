@@ -10,7 +10,8 @@ from numba import njit
 from numba.core import event
 
 from hybrid import HybridSystem, Mode, compile_system
-from hybrid.compiler.interrupts import PASS, between_passes
+from hybrid.compiler.interrupts import between_passes
+from hybrid.kernels.types.numba_door.session import PASS
 
 
 @pytest.fixture(autouse=True)

@@ -8,7 +8,6 @@ import pytest
 
 from hybrid.compiler.opaque import (
     OpaqueFunction,
-    _own_copy,
     check_plain,
     compiled_functions,
 )
@@ -79,15 +78,3 @@ def test_what_may_be_compiled_as_it_is():
             check_plain("Mode 'a': field", function)
     with pytest.raises(ModelError, match="what catches errors"):
         check_plain("Mode 'a': field", careful)
-
-
-def test_large_whole_numbers_among_defaults_are_floats():
-    def function(t, x, p, whole=2**31, large=2**31 + 1, low=-(2**40), real=0.5, flag=True):
-        return t
-
-    copy = _own_copy(function)
-    assert copy.__defaults__ == (2**31, 2.0**31 + 1, -(2.0**40), 0.5, True)
-    assert [type(each) for each in copy.__defaults__] == [int, float, float, float, bool]
-    assert (copy.__name__, copy.__module__) == ("function", __name__)
-    assert copy is not function
-    assert _own_copy(lambda t, x, p: t).__defaults__ == ()

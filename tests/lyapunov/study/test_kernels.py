@@ -9,7 +9,7 @@ from numba import cfunc
 import models
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.kernels.types.kinds import REAL, VECTOR
-from hybrid.kernels.types.numba_types import signature_of
+from hybrid.kernels.types.numba_door.numba_types import signature_of
 from hybrid.system.derivatives import evaluate
 from lyapunov.study import kernels
 from lyapunov.study.ode23s import parameters_of, scratch

@@ -12,7 +12,7 @@ from numba import cfunc
 import models
 from hybrid import simulate
 from hybrid.kernels.types.kinds import REAL, VECTOR
-from hybrid.kernels.types.numba_types import signature_of
+from hybrid.kernels.types.numba_door.numba_types import signature_of
 from lyapunov.study import ode23s
 from lyapunov.study.ode23s import Ode23s, StepTooSmall
 from lyapunov.study.runs import STARTS

@@ -7,10 +7,10 @@ import pytest
 import sympy
 from llvmlite import binding, ir
 
-from hybrid.compiler.llvm.builder import Builder
 from hybrid.compiler.llvm.calls import NUMBER, WHOLE
 from hybrid.compiler.llvm.lowering import MATRIX_SIGNATURE, VECTOR_SIGNATURE, LoweringError, parsed
 from hybrid.compiler.llvm.machine import machine_code
+from hybrid.kernels.types.numba_door.builder import Builder
 from hybrid.symbolic import expressions as sym
 from hybrid.symbolic.printer import MATH_FUNCTIONS, assignments, power_text
 from tests.hybrid.text import both
@@ -244,16 +244,14 @@ def test_types_that_do_not_fit_are_refused():
 def test_lines_are_read_by_llvm():
     """LLVM reads the lines, including addresses, aligned stores and flags."""
     module = ir.Module()
-    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [NUMBER.as_pointer(), WHOLE]), "f")
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [ir.PointerType(), WHOLE]), "f")
     address, index = function.args
     builder = Builder(function.append_basic_block("body"))
-    here = builder.gep(address, [builder.mul(index, WHOLE(3))])
-    value = builder.fmul(builder.load(here, align=8), NUMBER(-0.5), flags=("contract",))
+    here = builder.gep(address, [builder.mul(index, WHOLE(3))], source_etype=NUMBER)
+    value = builder.fmul(builder.load(here, align=8, typ=NUMBER), NUMBER(-0.5), flags=("contract",))
     builder.store(builder.fadd(value, NUMBER(float("inf"))), here, align=8)
-    bits = builder.load(builder.bitcast(here, WHOLE.as_pointer()))
-    builder.store(
-        builder.sub(bits, WHOLE(1)), builder.gep(builder.bitcast(address, WHOLE.as_pointer()), [index])
-    )
+    bits = builder.load(here, typ=WHOLE)
+    builder.store(builder.sub(bits, WHOLE(1)), builder.gep(address, [index], source_etype=WHOLE))
     builder.store(value, here, align=8, whole=True)
     builder.ret_void()
     binding.parse_assembly(str(module)).verify()

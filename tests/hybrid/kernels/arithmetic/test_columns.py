@@ -10,7 +10,7 @@ from hybrid.kernels.arithmetic.columns import (
     gather_tangents,
 )
 from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL
-from hybrid.kernels.types.numba_types import signature_of
+from hybrid.kernels.types.numba_door.numba_types import signature_of
 from tests.hybrid.text import both
 
 NOTHING = np.zeros(1)

@@ -6,7 +6,7 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.linear import factorise, substitute
 from hybrid.kernels.types.kinds import INDICES, MATRIX, TRUTH, VECTOR
-from hybrid.kernels.types.numba_types import signature_of
+from hybrid.kernels.types.numba_door.numba_types import signature_of
 
 
 @njit(signature_of(TRUTH, MATRIX, INDICES, VECTOR))

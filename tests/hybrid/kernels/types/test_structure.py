@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.types.kinds import CUBE, INDICES, INTEGER, MATRIX, REAL, VECTOR, function
-from hybrid.kernels.types.numba_types import signature_of
+from hybrid.kernels.types.numba_door.numba_types import signature_of
 from hybrid.kernels.types.structure import Layout, Structure
 
 
@@ -136,6 +136,24 @@ class TestLayout:
         read(Layout(Box, {"places": (2,)}, parcel=again).zeros(), out)
         np.testing.assert_array_equal(out, [-7.0, 0.1, 0.2, 0.0, 23.0, 233.0])
         np.testing.assert_array_equal(again.vector, [0.0, 5.0, 7.0])
+
+    def test_a_structure_is_renewed(self):
+        layout = self.layout()
+        first, one = layout.zeros(), layout.zeros()
+        first.vector[:], first.matrix[1] = 1.0, 2.0
+        layout.begin_as(first)
+        first.vector[:], one.matrix[:] = 7.0, 3.0
+        layout.renew(one)
+        assert one.vector.tolist() == [1.0] * 3
+        assert one.matrix.tolist() == [[0.0] * 3, [2.0] * 3]
+
+    def test_numbers_are_set_for_the_next_call(self):
+        inner, out = self.layout().zeros(), np.zeros(6)
+        changed = inner.replace(count=3)
+        changed.put(count=5, size=0.75)
+        assert (inner.count, changed.count, changed.size) == (-7, 5, 0.75)
+        read(Layout(Box, {"places": (2,)}, parcel=changed).zeros(), out)
+        assert out[:2].tolist() == [5.0, 0.75]
 
     def test_no_more_is_kept_than_a_few(self):
         layout = self.layout()

@@ -13,8 +13,8 @@ from numba.core import types
 from numba.core.compiler_lock import global_compiler_lock
 
 from hybrid.kernels.types.kinds import BY_WORDS, Pair, is_bundle, width_of
-from hybrid.kernels.types.numba_types import array_in, numba_type, signature_of, word_in
-from hybrid.kernels.types.part_compiler import WholeLibrary
+from hybrid.kernels.types.numba_door.numba_types import array_in, numba_type, signature_of, word_in
+from hybrid.kernels.types.numba_door.part_compiler import WholeLibrary
 
 WORD = ir.IntType(64)
 
@@ -32,7 +32,7 @@ class Export(NamedTuple):
 
     kernel: Any
     result: Any
-    arguments: tuple
+    arguments: tuple[Any, ...]
 
 
 def exports_of(module):
@@ -50,7 +50,7 @@ def object_code(exports):
 
     Functions that several of them call are compiled once.
     """
-    library = None
+    library: Any = None
     for name, (kernel, result, arguments) in exports.items():
         signature = signature_of(result, *arguments)
         kernel.compile(signature)
@@ -84,7 +84,7 @@ def _write_typed(context, module, name, described):
 
 def _write_by_words(context, module, called, result, arguments):
     """The function that Python calls: it reads the arguments from a table, whose address it is given."""
-    kind = ir.FunctionType(WORD, [WORD.as_pointer()])
+    kind = ir.FunctionType(WORD, [ir.PointerType()])
     function = ir.Function(module, kind, called.name + BY_WORDS)
     builder = ir.IRBuilder(function.append_basic_block("entry"))
     [table] = function.args

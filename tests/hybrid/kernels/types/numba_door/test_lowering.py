@@ -10,8 +10,8 @@ from numba import njit
 
 from hybrid.compiler.cache.kernel import file_of, kernels_in
 from hybrid.kernels.types.codes import NARROW
-from hybrid.kernels.types.export import exports_of, object_code
 from hybrid.kernels.types.kinds import CUBE, INDEX_MATRIX, INDICES, INTEGER, MATRIX, REAL, VECTOR, text_of
+from hybrid.kernels.types.numba_door.export import exports_of, object_code
 from hybrid.kernels.types.options import KERNEL, exported
 from hybrid.kernels.types.structure import Structure
 from tests.hybrid.kernels.plain import plain

@@ -144,17 +144,16 @@ class KernelLowering(Lower):
         data = take(value, DATA)
         if kind.layout != "C":
             bytes_on = builder.mul(places[0], take(value, (STRIDES, 0)))
-            start = builder.gep(
-                builder.bitcast(data, llvm.IntType(8).as_pointer()), [bytes_on], inbounds=True
-            )
-            return builder.bitcast(start, data.type), []
+            return builder.gep(data, [bytes_on], inbounds=True, source_etype=llvm.IntType(8)), []
         lengths = [take(value, (SHAPE, axis)) for axis in range(1, kind.ndim)]
         offset = places[0]
         for axis, length in enumerate(lengths, 1):
             offset = builder.mul(offset, length)
             if axis < len(places):
                 offset = builder.add(offset, places[axis])
-        return builder.gep(data, [offset], inbounds=True), lengths[len(places) - 1 :]
+        number = self.context.get_data_type(kind.dtype)
+        start = builder.gep(data, [offset], inbounds=True, source_etype=number)
+        return start, lengths[len(places) - 1 :]
 
     def _item(self, resty, array, place):
         found = self._address(array, place)
@@ -162,8 +161,9 @@ class KernelLowering(Lower):
             return None
         address, lengths = found
         if not lengths:
-            value = self.builder.load(address)
-            return self.context.cast(self.builder, value, self.typeof(array.name).dtype, resty)
+            dtype = self.typeof(array.name).dtype
+            value = self.builder.load(address, typ=self.context.get_data_type(dtype))
+            return self.context.cast(self.builder, value, dtype, resty)
         return array_of(self.context, self.builder, resty, address, lengths)
 
     def lower_setitem(self, target_var, index_var, value_var, signature):
@@ -198,7 +198,7 @@ class KernelLowering(Lower):
     def _next_turn(self, resty, expr):
         builder, iterator = self.builder, self.loadvar(expr.value.name)
         slot, last, step = (builder.extract_value(iterator, each) for each in (HERE, LAST, BY))
-        place = builder.load(slot)
+        place = builder.load(slot, typ=WORD)
         rises = builder.icmp_signed(">", step, WORD(0))
         below, above = (builder.icmp_signed(sign, place, last) for sign in "<>")
         goes_on = builder.select(rises, below, above)
@@ -233,7 +233,7 @@ class KernelLowering(Lower):
         context.add_linking_libs([compiled.library])
         convention = context.call_conv
         function = context.declare_function(builder.module, described)
-        slot = self._slot(convention.get_return_type(described.restype).pointee)
+        slot = self._slot(context.data_model_manager[described.restype].get_return_type())
         packed = convention._get_arg_packer(described.argtypes).as_arguments(builder, arguments)
         # Kernels raise nothing, so nobody looks at what the call says of that.
         builder.call(function, [slot, convention._get_excinfo_argument(builder.function), *packed])

@@ -71,23 +71,23 @@ class Builder(ir.IRBuilder):
     fadd, fsub, fmul, fdiv = map(_arithmetic, ("fadd", "fsub", "fmul", "fdiv"))
 
     def load(self, ptr: Any, name: str = "", align: int | None = None, typ: Any = None) -> Line:
-        """The value stored at an address."""
-        kind = typ or ptr.type.pointee
+        """The value stored at an address, of this type, or that of the variable at the address."""
+        kind = typ or ptr.allocated_type
         text = f"load {_text(kind)}, {_text(ptr.type)} {_reference(ptr)}"
         return self.written(kind, text if align is None else f"{text}, align {align}")
 
     def store(self, value: Any, ptr: Any, align: int | None = None, *, whole: bool = False) -> Line:
         """Store a value at an address; ``whole`` as one register, also where LLVM would store its halves."""
-        if ptr.type.pointee != value.type:
+        if not ptr.type.is_opaque and ptr.type.pointee != value.type:
             raise TypeError(f"{value.type} cannot be stored at {ptr.type}")
         words = "store volatile" if whole else "store"
         text = f"{words} {_text(value.type)} {_reference(value)}, {_text(ptr.type)} {_reference(ptr)}"
         return self._added(Line(ir.VoidType(), "", text if align is None else f"{text}, align {align}"))
 
-    def gep(self, ptr: Any, indices: Sequence[Any]) -> Any:
-        """The address ``indices[0]`` entries after ``ptr``; ``indices`` has one entry."""
+    def gep(self, ptr: Any, indices: Sequence[Any], *, source_etype: Any) -> Any:
+        """The address ``indices[0]`` entries of a type after ``ptr``; ``indices`` has one entry."""
         [index] = indices
-        entry, place = _text(ptr.type.pointee), f"{_text(index.type)} {_reference(index)}"
+        entry, place = _text(source_etype), f"{_text(index.type)} {_reference(index)}"
         return self.written(ptr.type, f"getelementptr {entry}, {_text(ptr.type)} {_reference(ptr)}, {place}")
 
     def bitcast(self, value: Any, typ: Any, name: str = "") -> Any:

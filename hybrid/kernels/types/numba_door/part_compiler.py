@@ -9,12 +9,14 @@ expressions and no references to count, so many of its passes change nothing. Wh
 or a type, it finds out again in every function; here it is remembered.
 """
 
+from typing import Any
+
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
 
-from hybrid.kernels.types.lowering import KernelLowering
+from hybrid.kernels.types.numba_door.lowering import KernelLowering
 
 # What every step of a run and its tangent vectors go through. Optimised by itself as well, it comes out a few
 # parts in a hundred faster.
@@ -174,8 +176,8 @@ class _Remembering:
 
 
 # What has been found for all kernels: signatures of calls, and sizes of types in memory by their text.
-_SIGNATURES = {}
-_SIZES = {}
+_SIGNATURES: dict[Any, Any] = {}
+_SIZES: dict[str, int] = {}
 
 
 class PartCompiler(CompilerBase):

@@ -8,8 +8,8 @@ from numba.core.event import Listener, install_listener
 
 from hybrid.compiler.cache.kernel import file_of, kernels_in
 from hybrid.compiler.cache.loader import compiled
-from hybrid.kernels.types.export import exports_of, object_code
 from hybrid.kernels.types.kinds import INTEGER, REAL, text_of
+from hybrid.kernels.types.numba_door.export import exports_of, object_code
 from hybrid.kernels.types.options import INLINE, KERNEL, exported
 
 

@@ -4,7 +4,9 @@ Only the compilation of kernels imports this module.
 """
 
 from functools import cache
+from typing import Any
 
+from llvmlite import ir
 from numba import types
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
@@ -20,7 +22,7 @@ from numba.extending import (
 from numba.np.arrayobj import populate_array
 
 from hybrid.kernels.types.kinds import TRUTH, Array, Function, Number, Pair, is_bundle
-from hybrid.kernels.types.lowering import array_of
+from hybrid.kernels.types.numba_door.lowering import WORD, array_of
 from hybrid.kernels.types.structure import Structure
 
 
@@ -51,7 +53,7 @@ def numba_type(kind):
     if is_bundle(kind):
         return types.BaseTuple.from_types([numba_type(each) for each in kind.__annotations__.values()], kind)
     if isinstance(kind, Function):
-        return types.ExternalFunctionPointer(signature_of(kind.result, *kind.arguments), None)
+        return types.ExternalFunctionPointer(signature_of(kind.result, *kind.arguments), None)  # type: ignore[arg-type]
     return StructureType(kind)
 
 
@@ -67,7 +69,8 @@ class _Address(models.OpaqueModel):
 
 @typeof_impl.register(Structure)
 def _typeof(value, context):
-    return numba_type(type(value))
+    kind: Any = type(value)
+    return numba_type(kind)
 
 
 @unbox(StructureType)
@@ -82,11 +85,11 @@ def _unbox(kind, value, c):
 class _Fields(AttributeTemplate):
     key = StructureType
 
-    def generic_resolve(self, structure, field):
-        if field in structure.entries:
-            kind = structure.fields[structure.entries[field][0]]
+    def generic_resolve(self, value, attr):  # type: ignore[override]
+        if attr in value.entries:
+            kind = value.fields[value.entries[attr][0]]
             return kind.dtype if kind.ndim == 1 else _column_type(kind)
-        return structure.fields.get(field)
+        return value.fields.get(attr)
 
 
 @lower_getattr_generic(StructureType)
@@ -121,7 +124,8 @@ def _entry_of(context, builder, structure, address, name):
     field, _ = structure.entries[name]
     kind = structure.fields[field]
     if kind.ndim == 1:
-        return builder.load(_place_of_entry(context, builder, structure, address, name))
+        entry = _place_of_entry(context, builder, structure, address, name)
+        return builder.load(entry, typ=context.get_value_type(kind.dtype))
     place, integer = structure.places[field], context.get_value_type(types.intp)
     rows, width = (word_in(context, builder, address, place + axis, integer) for axis in (1, 2))
     itemsize = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(kind.dtype)))
@@ -135,15 +139,16 @@ def _entry_of(context, builder, structure, address, name):
 def _place_of_entry(context, builder, structure, address, name):
     """Address of a named entry."""
     field, index = structure.entries[name]
-    pointer = context.get_value_type(structure.fields[field].dtype).as_pointer()
-    array = word_in(context, builder, address, structure.places[field], pointer)
-    return builder.gep(array, [context.get_constant(types.intp, index)], inbounds=True)
+    array = word_in(context, builder, address, structure.places[field], ir.PointerType())
+    place = context.get_constant(types.intp, index)
+    number = context.get_value_type(structure.fields[field].dtype)
+    return builder.gep(array, [place], inbounds=True, source_etype=number)
 
 
 def word_in(context, builder, address, place, llvm_type):
     """A word of the table, which never changes."""
-    table = builder.bitcast(address, llvm_type.as_pointer())
-    loaded = builder.load(builder.gep(table, [context.get_constant(types.intp, place)]))
+    word = builder.gep(address, [context.get_constant(types.intp, place)], source_etype=WORD)
+    loaded = builder.load(word, typ=llvm_type)
     loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
     return loaded
 
@@ -152,4 +157,4 @@ def array_in(context, builder, kind, word):
     """An array that owns nothing: the structure on the side of Python keeps its memory."""
     integer = context.get_value_type(types.intp)
     shape = [word(1 + axis, integer) for axis in range(kind.ndim)]
-    return array_of(context, builder, kind, word(0, context.get_data_type(kind.dtype).as_pointer()), shape)
+    return array_of(context, builder, kind, word(0, ir.PointerType()), shape)
