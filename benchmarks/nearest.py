@@ -185,7 +185,8 @@ NEAREST = {
         "compiler/taylor/test_series.py",
         "accuracy/test_work_precision.py",
     ),
-    "hybrid/kernels/steps/forcing.py": (
+    "hybrid/kernels/steps/field/explained.py": (
+        "kernels/steps/test_field.py",
         "compiler/bounds/test_forcing.py",
         "compiler/bounds/test_pulses_in_state.py",
     ),
@@ -210,7 +211,7 @@ NEAREST = {
         "solvers/test_gaps.py",
         "solvers/test_pace.py",
     ),
-    "hybrid/kernels/steps/pulses.py": (
+    "hybrid/kernels/steps/field/pulses.py": (
         "compiler/bounds/test_forcing.py",
         "compiler/bounds/test_pulses_in_state.py",
     ),

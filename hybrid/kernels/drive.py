@@ -10,8 +10,8 @@ from hybrid.kernels.events.guards import (
     rounding_band,
 )
 from hybrid.kernels.limit.go import may_accumulate
-from hybrid.kernels.steps.disguised_jumps import leave
-from hybrid.kernels.steps.late import is_late
+from hybrid.kernels.steps.field.jumps import leave
+from hybrid.kernels.steps.field.late import is_late
 from hybrid.kernels.steps.series import series_step
 from hybrid.kernels.types.codes import (
     ACCUMULATION,
@@ -89,8 +89,6 @@ def fire(parts, task, stop_cycle, stop_phase, max_jumps):
 def enter(parts, task):
     """Begin a stay in a mode: take the side of every guard; returns ``GO_ON``, or why the run ends."""
     model, run, mode = task.model, task.run, task.run.mode
-    # A jump may have changed a component that tells the time of the forcing.
-    run.calm_mode = 0
     if not finite(run, model.dimension * (1 + task.tangents)):
         return NON_FINITE
     fires = parts.enter(model, run, task.work)

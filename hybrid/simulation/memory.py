@@ -159,7 +159,7 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int, rows: 
         "weights": (1, width_of_series),
         "registers": (max(rows, 1), codes.REGISTERS),
         "samples": (max(len(method.nodes), len(method.series_nodes)) + 1, 2 * rows),
-        "places": (len(method.nodes) + max(stages - len(method.b) - 1, 0), n + 1),
+        "rates": (2, length),
     }
     return Layout(Work, shapes)
 

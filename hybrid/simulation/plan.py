@@ -201,10 +201,10 @@ def driver_parts(
         return load() if asked else Absent()
 
     def late() -> Any:
-        return load_kernels("hybrid.kernels.steps.late")
+        return load_kernels("hybrid.kernels.steps.field.late")
 
     def forcing() -> Any:
-        return load_kernels("hybrid.kernels.steps.forcing")
+        return load_kernels("hybrid.kernels.steps.field.explained")
 
     jumps, corners = load_kernels("hybrid.kernels.jumps.jump"), load_kernels("hybrid.kernels.jumps.corner")
     module, name = attempt
@@ -218,7 +218,7 @@ def driver_parts(
         rests_on_guard=corners.rests_on_guard,
         arrived=corners.arrived,
         keep_apart=needed(tangents, lambda: load_kernels("hybrid.kernels.arithmetic.tangent").keep_apart),
-        look_back=needed(abrupt, lambda: load_kernels("hybrid.kernels.steps.disguised_jumps").look_back),
+        look_back=needed(abrupt, lambda: load_kernels("hybrid.kernels.steps.field.jumps").look_back),
         late_step=needed(timed, lambda: late().late_step),
         late_jump=needed(timed, lambda: late().late_jump),
         jump=jumps.jump,
@@ -231,6 +231,7 @@ def driver_parts(
         attempt_implicit=vars(load_kernels(module))[name],
         explained_step=needed(forced, lambda: forcing().explained_step),
         explained_attempt=needed(forced, lambda: forcing().explained_attempt),
+        follows_attempt=needed(forced, lambda: forcing().follows_attempt),
         explained_series=needed(forced, lambda: forcing().explained_series),
         crossing_on_path=load_kernels("hybrid.kernels.guards.isolate").crossing_on_path,
     )

@@ -9,7 +9,6 @@ from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.tangent import independence
 from hybrid.kernels.events.guards import (
     guard_value,
-    has_terms_in_state,
     is_forced,
     rounding_band,
     sides_at,
@@ -328,6 +327,18 @@ def take(task, h, correction, fired, whole):
         carry_rates(method, model.dimension * (1 + tangents), work)
 
 
+@njit(**INLINE)
+def follows(task, h, whole):
+    """Whether the interpolant of the ``whole`` attempted step, or of the part that is taken, has the field.
+
+    A step that ends at an event is not asked: the field may change behind a guard, where its last stages lie.
+    """
+    attempts, model, method, run, _, work = task_of(task)
+    if h < whole:
+        interpolation_stages(model, method, run.mode, run.phase, h, run.y, work)
+    return attempts.follows_attempt(model, method, run, h, work)
+
+
 @exported(Pair(REAL), Task, REAL)
 def runge_kutta_step(task, remaining):
     """One step, to the first event on it or to the end of the run; returns a code and the step in time.
@@ -350,22 +361,27 @@ def runge_kutta_step(task, remaining):
     run.steps += 1
     if not ratio <= 1.0:
         return reject(task, h, ratio)
-    interpolated = has_terms_in_state(model, mode)
+    interpolated = is_forced(model, mode)
     if interpolated:
         interpolation_stages(model, method, mode, t, h, run.y, work)
         explained = attempts.explained_attempt(model, method, run, h, work)
         if explained < h:
             return try_shorter(run, explained)
     fired, correction, whole = NO_TRANSITION, 0.0, h
-    if model.first_outgoing[mode + 1] > model.first_outgoing[mode]:
+    guarded = model.first_outgoing[mode + 1] > model.first_outgoing[mode]
+    if guarded:
         h, correction, fired = find_event(task, h, interpolated)
         if math.isnan(h):
             return STEP_TOO_SMALL, 0.0
         # Where the field ends at the guard, a landing may have no value: a shorter step comes nearer to it.
         if h == 0.0 if fired == NO_TRANSITION else is_lost(model, work):
             return try_shorter(run, SHORTER * whole)
-        if run.grazing_place * whole <= h:
-            remember_touch_on_step(model, method, run, record, t, h, whole, work)
+    if interpolated and fired == NO_TRANSITION and not follows(task, h, whole):
+        if guarded:
+            restore_sides(model, run)
+        return reject(task, whole, math.inf)
+    if guarded and run.grazing_place * whole <= h:
+        remember_touch_on_step(model, method, run, record, t, h, whole, work)
     grow = growth_factor(method, run, whole, max(ratio, 1e-16))
     run.next_step = max(proposed, whole * grow) if last else whole * grow
     run.last_step, run.last_ratio = whole, max(ratio, 1e-16)

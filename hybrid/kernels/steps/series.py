@@ -22,6 +22,7 @@ from hybrid.kernels.events.record import start_record
 from hybrid.kernels.events.resolution import restore_sides
 from hybrid.kernels.guards.touch import remember_touch
 from hybrid.kernels.instructions.registers import whole_registers
+from hybrid.kernels.steps.field.residual import followed
 from hybrid.kernels.steps.series_guards import earliest_on_series
 from hybrid.kernels.steps.series_length import (
     EXACT_TOLERANCE,
@@ -32,7 +33,7 @@ from hybrid.kernels.steps.series_length import (
     longest_step,
     within_floats,
 )
-from hybrid.kernels.steps.series_roots import expanded_at, time_of
+from hybrid.kernels.steps.series_roots import time_of
 from hybrid.kernels.steps.step import moves_nothing, rates_by_jacobian
 from hybrid.kernels.types.codes import (
     DESINGULARISED,
@@ -55,16 +56,11 @@ from hybrid.kernels.types.layout import EPSILON, Path
 from hybrid.kernels.types.options import INLINE, KERNEL
 from hybrid.kernels.types.task import task_of
 
-# The field and the slope of a series may differ by the tolerance over this share of a step.
-SHARE_OF_STEP = 0.25
-MOST_HALVINGS = 1000
 # Share of a step that is tried next if the end of the series hides on which side of a guard the step ends.
 SHORTER = 0.75
 MOST_SHORTER = 100
 # Shortest step, in units of the rounding of time.
 FINEST = 4.0 * EPSILON
-# Rounding of a state by which the noise of its field is measured.
-ROUNDING = 8.0 * EPSILON
 # Largest correction of a landing, as a share of the step.
 CLOSE = 1e-8
 # A flight without end is followed for this many times the time in which the state changes by its size.
@@ -79,36 +75,6 @@ NEXT_TO_NOTHING = 1e-10
 def number_of_guards(model, mode):
     """How many guards the series of a mode may hold."""
     return model.first_outgoing[mode + 1] - model.first_outgoing[mode]
-
-
-@njit(**KERNEL)
-def followed(model, method, run, path, work):
-    """The length of a path on which the series of the state has the field as its derivative.
-
-    The terms that were left out grow fastest, so the end of the step and a place before it tell. What
-    rounding of the state makes of the field is no misfit.
-    """
-    n, series, order, t, h = model.dimension, path.powers, path.degree, path.start, path.length
-    state, field, other = work.trial, work.stages[0], work.stages[1]
-    for _ in range(MOST_HALVINGS):
-        follows = True
-        for part in range(1, 3):
-            s = 0.5 * part * h
-            for i in range(n):
-                state[i], _, _ = expanded_at(series, i, 0, order, s)
-            model.field(run.mode, t + s, state, model.parameters, field)
-            for i in range(n):
-                state[i] *= 1.0 + (ROUNDING if i // 2 % 2 == 0 else -ROUNDING)
-            model.field(run.mode, t + s, state, model.parameters, other)
-            for i in range(n):
-                _, slope, _ = expanded_at(series, i, 0, order, s)
-                tolerance = method.atol + method.rtol * max(abs(run.y[i]), abs(state[i]))
-                misfit, noise = abs(field[i] - slope), abs(other[i] - field[i])
-                follows = follows and SHARE_OF_STEP * h * (misfit - noise) <= tolerance
-        if follows:
-            break
-        h *= 0.5
-    return h
 
 
 @njit(**KERNEL)
@@ -281,7 +247,7 @@ def trusted(task, path, remaining):
         return up_to(path, attempts.explained_series(model, method, run, tangents, path, work))
     if polynomial or clock >= 0 or is_regular(series, n, order, tolerance, last, growth, work.weights):
         return path
-    return up_to(path, followed(model, method, run, path, work))
+    return up_to(path, followed(model, method, run, tangents, path, work))
 
 
 @njit(**INLINE)

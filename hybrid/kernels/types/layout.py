@@ -217,9 +217,6 @@ COUNTERS = (
     "unchecked",
     "unresolved",
     "coarse",
-    "calm_mode",
-    "calm_cycle",
-    "calm_wait",
     "steep_jumps",
     "ran_dry",
     "field_jumps",
@@ -246,7 +243,6 @@ NUMBERS = (
     "strain",
     "since_entry",
     "phase_low",
-    "calm_until",
     "horizon",
     "lateness",
     "longest_step",
@@ -321,8 +317,7 @@ class Work(Structure):
     and of a guard on it;
     ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for its isolation; ``registers (r, 6)``,
     what is known of each row of a program, and ``samples (nodes + 1, 2 r)`` the ranges of these rows at the
-    nodes of a step and what they have in common; ``places (nodes + m, n + 1)``,
-    the states and shares of the step at the nodes and at the m stages of the interpolant alone.
+    nodes of a step and what they have in common; ``rates (2, N)``, the field along a step.
 
     For implicit methods, else empty: ``systems ((s + 1) n + s + 4, s n)``, ``pivots ((s + 1) n,)``. The rows
     are the factored matrix of the stages, that of the estimate's filter ``(n, n)``, a right-hand side, and
@@ -357,7 +352,7 @@ class Work(Structure):
     intervals: MATRIX
     registers: MATRIX
     samples: MATRIX
-    places: MATRIX
+    rates: MATRIX
     systems: MATRIX
     pivots: INDICES
     series: MATRIX
@@ -404,13 +399,15 @@ class Attempts(Structure):
     """What a step may need: parts that are not compiled where they are not called.
 
     ``attempt_implicit`` is the step of an implicit method; ``explained_step``, ``explained_attempt`` and
-    ``explained_series`` shorten a step so that no pulse of the field is hidden from it;
+    ``explained_series`` shorten a step so that no pulse of the field is hidden from it; ``follows_attempt``
+    compares the interpolant of a step with the field;
     ``crossing_on_path`` finds the crossing of a guard that no cheap proof decides.
     """
 
     attempt_implicit: function(REAL, Model, Method, INTEGER, REAL, REAL, VECTOR, INTEGER, Work)
     explained_step: function(REAL, Model, Method, Run, REAL, Work)
     explained_attempt: function(REAL, Model, Method, Run, REAL, Work)
+    follows_attempt: function(TRUTH, Model, Method, Run, REAL, Work)
     explained_series: function(REAL, Model, Method, Run, INTEGER, Path, Work)
     crossing_on_path: function(Pair(REAL), Model, Method, Run, INTEGER, INTEGER, Path, REAL, Work)
 

@@ -24,22 +24,20 @@ def is_late(method, run):
 
 
 @njit(**INLINE)
-def keep_largest(method, run, i, change, other):
-    """Keep a change of component ``i``, whose size is that over the last step or the ``other`` number."""
-    tolerance = method.atol + method.rtol * max(run.scale[i], abs(other))
-    if abs(change) > run.lateness * tolerance:
-        run.lateness = abs(change) / tolerance
+def _keep_largest(method, run, i, change, size):
+    """Keep a change of component ``i``, whose size is that over the last step or the ``size`` given."""
+    tolerance = method.atol + method.rtol * max(run.scale[i], abs(size))
+    run.lateness = max(run.lateness, abs(change) / tolerance)
 
 
 @exported(None, Model, Method, Run, REAL, Work)
 def late_step(model, method, run, span, work):
     """Keep in ``run.lateness`` what the rounding of the time makes of the field over a step."""
-    t, later = run.phase, run.phase + EPSILON * abs(run.phase)
-    model.field(run.mode, t, run.y, model.parameters, work.field)
-    model.field(run.mode, later, run.y, model.parameters, work.field_after)
+    t, before, after = run.phase, work.field, work.field_after
+    model.field(run.mode, t, run.y, model.parameters, before)
+    model.field(run.mode, t + EPSILON * abs(t), run.y, model.parameters, after)
     for i in range(model.dimension):
-        change = span * (work.field_after[i] - work.field[i])
-        keep_largest(method, run, i, change, span * work.field[i])
+        _keep_largest(method, run, i, span * (after[i] - before[i]), span * before[i])
 
 
 @exported(None, Model, Method, Run, INTEGER, Work)
@@ -49,20 +47,19 @@ def late_jump(model, method, run, transition, work):
     A guard is crossed at another time, and the reset is another one. The time alone is no error of the state:
     a marker changes nothing.
     """
-    target = model.target[transition]
+    target, t = model.target[transition], run.phase
     if target == NO_MODE or model.marker[transition] == 1:
         return
-    t, rounding = run.phase, EPSILON * abs(run.phase)
-    before, after, image = work.field, work.field_after, work.new
+    before, after, image, later = work.field, work.field_after, work.new, t + EPSILON * abs(t)
     model.field(run.mode, t, run.y, model.parameters, before)
     speed = guard_speed(model, transition, t, run.y, before, work.gradient)
-    value = guard_value(model, transition, t, run.y, work.scalar)
-    change = guard_value(model, transition, t + rounding, run.y, work.scalar) - value
+    change = guard_value(model, transition, later, run.y, work.scalar)
+    change -= guard_value(model, transition, t, run.y, work.scalar)
     delay = change / speed if abs(change) < abs(speed) * run.since_entry else run.since_entry
     model.reset(transition, t, run.y, model.parameters, image)
     model.field(target, t, image, model.parameters, after)
     for i in range(model.dimension):
         work.state[i] = run.y[i] + delay * before[i]
-    model.reset(transition, t + rounding, work.state, model.parameters, work.trial)
+    model.reset(transition, later, work.state, model.parameters, work.trial)
     for i in range(model.dimension):
-        keep_largest(method, run, i, work.trial[i] - image[i] - delay * after[i], image[i])
+        _keep_largest(method, run, i, work.trial[i] - image[i] - delay * after[i], image[i])

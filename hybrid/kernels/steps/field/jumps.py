@@ -14,17 +14,13 @@ from hybrid.kernels.types.kinds import REAL
 from hybrid.kernels.types.layout import EPSILON, Method, Model, Run, Work
 from hybrid.kernels.types.options import KERNEL, exported
 
-# A step past a jump moves the state by less than this share of its size, and by fewer relative tolerances.
-SHORT = 0.03
-IN_TOLERANCES = 1e7
-# A jump changes a rate by more than this share of it.
+# A jump changes a rate by more than this share of it; one of less changes tangent vectors by no more.
 LEAST = 1e-6
-# On a step with a hidden jump, the change of a rate times the step is less than so many tolerances.
-HIDDEN = 1e4
-# The step is halved so many times towards a jump; most of the change is still there after the first few, and
-# at some time it is so many times what the derivatives at the ends of the rest explain.
+# A jump times the step is less than so many tolerances: methods see a jump by a thousandth of it, or more.
+HIDDEN = 1e3
+# The step is halved so many times towards the largest change. At a jump most of the change is still there,
+# and at some time it is so many times what the derivatives at both ends explain.
 HALVINGS = 10
-FEW_HALVINGS = 3
 UNEXPLAINED = 30.0
 
 
@@ -40,67 +36,57 @@ def look_back(model, method, run, span, work):
     """After a step of length ``span``, from the clock's time, count it if the field has jumped on it."""
     if model.propagator[run.mode] == EXACT:
         return
-    moved, size = 0.0, 0.0
-    for i in range(model.dimension):
-        moved += abs(run.y[i] - work.departure[i])
-        size += max(abs(run.y[i]), abs(work.departure[i]))
-    if not 0.0 < moved < min(SHORT, IN_TOLERANCES * method.rtol) * size:
-        return
-    # At one time: a jump at a time that no state moves does nothing to tangent vectors.
-    jumps = jumps_between(model, method, run, run.phase, span, work)
+    # At one time: a jump at a time that no state moves does nothing to tangent vectors. The place of a jump
+    # may move, so that the orbit meets it at the end only.
+    jumps = _jumps_between(model, method, run, run.phase, span, work)
     if not jumps and model.timed[run.mode] == 1:
-        jumps = jumps_between(model, method, run, run.phase + span, span, work)
+        jumps = _jumps_between(model, method, run, run.phase + span, span, work)
     if jumps:
         run.field_jumps += 1
         run.jumped_in = run.mode
 
 
 @njit(**KERNEL)
-def jumps_between(model, method, run, t, span, work):
+def _jumps_between(model, method, run, t, span, work):
     """Whether the field at the time ``t`` jumps between the state before the step and the one after it."""
     model.field(run.mode, t, work.departure, model.parameters, work.field)
     model.field(run.mode, t, run.y, model.parameters, work.field_after)
     for i in range(model.dimension):
         before, after = work.field[i], work.field_after[i]
-        change = abs(after - before)
         tolerance = method.atol + method.rtol * max(abs(run.y[i]), abs(work.departure[i]))
-        some = change > LEAST * (abs(before) + abs(after))
-        if some and change * span < HIDDEN * tolerance and rate_jumps(model, run, t, i, before, after, work):
+        some = abs(after - before) > LEAST * (abs(before) + abs(after))
+        hidden = abs(after - before) * span < HIDDEN * tolerance
+        if some and hidden and _rate_jumps(model, run, t, i, before, after, work):
             return True
     return False
 
 
 @njit(**KERNEL)
-def rate_jumps(model, run, t, i, before, after, work):
+def _rate_jumps(model, run, t, i, before, after, work):
     """Whether the rate of component ``i``, given at the two ends of the step, jumps between them."""
-    n = model.dimension
-    low, high = work.trial, work.new
-    for j in range(n):
+    low, high, middle = work.trial, work.new, work.error
+    for j in range(model.dimension):
         low[j], high[j] = work.departure[j], run.y[j]
     most = 0.5 * abs(after - before)
-    for halvings in range(HALVINGS + 1):
-        change = abs(after - before)
-        if halvings >= FEW_HALVINGS:
-            if change < most:
-                return False
-            if change > UNEXPLAINED * explained_change(model, run.mode, t, i, low, high, work):
-                return True
-        for j in range(n):
-            work.error[j] = 0.5 * (low[j] + high[j])
-        model.field(run.mode, t, work.error, model.parameters, work.second_error)
+    for _ in range(HALVINGS):
+        for j in range(model.dimension):
+            middle[j] = 0.5 * (low[j] + high[j])
+        model.field(run.mode, t, middle, model.parameters, work.second_error)
         between = work.second_error[i]
         upper = abs(after - between) > abs(between - before)
-        for j in range(n):
-            if upper:
-                low[j] = work.error[j]
-            else:
-                high[j] = work.error[j]
+        end = low if upper else high
+        for j in range(model.dimension):
+            end[j] = middle[j]
         before, after = (between, after) if upper else (before, between)
+        if abs(after - before) < most:
+            return False
+        if abs(after - before) > UNEXPLAINED * _explained_change(model, run.mode, t, i, low, high, work):
+            return True
     return False
 
 
 @njit(**KERNEL)
-def explained_change(model, mode, t, i, low, high, work):
+def _explained_change(model, mode, t, i, low, high, work):
     """How much the rate of component ``i`` changes between two states, by its derivatives there."""
     moves, total = work.state, 0.0
     for j in range(model.dimension):
