@@ -42,14 +42,15 @@ POLYNOMIAL = {
 SMOOTH = {
     1: (
         *(of(kind) for kind in (ops.Sin, ops.Cos, ops.Tanh, ops.Arctan)),
-        *(lambda a: (1 + a**2) ** Fraction(1, 2), lambda a: (2 + a**2) ** -1, lambda a: of(ops.Exp)(-(a**2))),
+        lambda a: (1 + a**2) ** Fraction(1, 2),
+        lambda a: (2 + a**2) ** -1,
+        lambda a: of(ops.Exp)(-(a**2)),
     ),
     2: (
-        *(lambda a, b: a / (2 + b**2), lambda a, b: (1 + a**2) ** b),
-        *(
-            lambda a, b: ((1 + a**2) ** 2 * (2 + b**2) ** 4 / 3) ** Fraction(3, 4),
-            lambda a, b: (a**2 + b**2 + 1) ** -0.3,
-        ),
+        lambda a, b: a / (2 + b**2),
+        lambda a, b: (1 + a**2) ** b,
+        lambda a, b: ((1 + a**2) ** 2 * (2 + b**2) ** 4 / 3) ** Fraction(3, 4),
+        lambda a, b: (a**2 + b**2 + 1) ** -0.3,
     ),
 }
 KINKED = {

@@ -176,15 +176,6 @@ def test_a_branch_on_an_array_entry_is_not_overlooked():
     assert complex_step_error(system.variables, field_function(system.modes[0], system.dimension)) is not None
 
 
-def test_a_derivative_rounds_as_the_function_does():
-    """3*(a - b) stays a product: 3*a - 3*b would not be exact where a - b is."""
-    symbols = model_symbols(3, 0)
-    a, b, c = symbols.x
-    [row] = jacobian_of(trace(lambda t, x, p: 3.0 * (x[0] - x[1]) * x[2], 3, ()), (c,))
-    assert row[0].is_Mul
-    assert a - b in row[0].args
-
-
 class TestReference:
     """Derivatives of one field at ``t = 0.8``, ``x = (1.25, -0.5)``, whose second entry is given."""
 
