@@ -3,42 +3,27 @@
 import pickle
 
 import numpy as np
-import pytest
+from hypothesis import given
 
 from hybrid.expression.evaluation import expressed, scalar
 from hybrid.expression.operations import Less, Select, Sin
 from hybrid.expression.tracing import model_symbols, trace
+from tests.hybrid.expression.formulas import anything, at, expression_of, places, smooth
 
 SYMBOLS = model_symbols(2, 1)
 (Q, V), (K,), T = SYMBOLS.x, SYMBOLS.p, SYMBOLS.t
-FUNCTIONS = {
-    "smooth": lambda t, x, p: x[0] * x[1] - t / p[0] + x[0] ** 1.5 + np.exp(np.sin(x[1])) - np.pi,
-    "kinks": lambda t, x, p: np.abs(x[1]) + 2 * np.maximum(x[0], x[1]) + np.hypot(x[0], x[1]) + np.cbrt(x[1]),
-    "jumps": lambda t, x, p: np.sign(x[1]) + np.heaviside(x[0], 0.5) + 10 * np.ceil(x[1]) + np.mod(x[1], 0.4),
-    "choices": lambda t, x, p: np.where((x[0] < x[1]) | (x[0] == t), 1.0, np.where(x[1] <= t, 2.0, 3.0)),
-    "connectives": lambda t, x, p: np.where((x[0] > 0) & ~(x[1] > 0), x[0], x[1]),
-}
-PLACES = [(0.3, (0.45, -1.3), (1.7,)), (1.1, (0.8, 0.6), (2.5,))]
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_on_numbers_they_are_the_function(name):
-    function = FUNCTIONS[name]
-    expressions = trace(lambda t, x, p: (function(t, x, [p.k]), x[0]), 2, ("k",))
+@given(anything, smooth, places)
+def test_on_numbers_they_are_the_function_and_in_tracing_the_expressions(one, other, place):
+    expressions = [*map(expression_of, (one, other))]
     both, first = expressed(expressions), scalar(expressions[0])
-    for t, x, p in PLACES:
-        expected = float(function(np.float64(t), np.array(x), np.array(p)))
-        found = both(np.float64(t), np.array(x), np.array(p))
-        assert float(found[0]) == pytest.approx(expected, rel=1e-14)
-        assert found[1] == x[0]
-        assert float(first(np.float64(t), np.array(x), np.array(p))) == float(found[0])
-
-
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_tracing_gets_the_expressions_themselves(name):
-    expressions = trace(lambda t, x, p: (FUNCTIONS[name](t, x, [p.k]), x[0]), 2, ("k",))
-    assert trace(expressed(expressions), 2, ("k",)) == expressions
-    assert trace(lambda t, x, p: (scalar(expressions[0])(t, x, p),), 2, ("k",)) == expressions[:1]
+    point = 0.0, np.array(place[:2]), np.array(place[2:])
+    with np.errstate(all="ignore"):
+        np.testing.assert_array_equal(both(*point), at(expressions, place))
+        np.testing.assert_array_equal(first(*point), both(*point)[0])
+    assert trace(both, 2, ("k",)) == expressions
+    assert trace(lambda t, x, p: (first(t, x, p),), 2, ("k",)) == expressions[:1]
 
 
 def test_in_other_symbols_products_stay_products():

@@ -91,12 +91,6 @@ def test_symbols_are_named_as_code_reads_them():
     ]
 
 
-def test_a_stiff_difference_is_not_multiplied_out():
-    (expression,) = traced_scalar(lambda a, b: 3 * (a - b))
-    x = np.array([1.0 + 2.0**-52, 1.0])
-    assert evaluate([expression], 0.0, x, [])[0] == 3 * 2.0**-52
-
-
 def fails(function, text, state=NAMES):
     with pytest.raises(TraceError, match=text) as caught:
         trace(function, state, ())
