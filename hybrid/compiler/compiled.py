@@ -269,6 +269,7 @@ class CompiledSystem:
             **self.functions(EVENTS),
             variational_field=Absent(),
             series=Absent(),
+            **self.emitted.arrays(),
             parameters=system.parameter_values(),
             dimension=system.dimension,
             first_outgoing=first_outgoing,
@@ -277,18 +278,9 @@ class CompiledSystem:
             at_start=at_start,
             target=_indices(_index_or_none(system, transition.target) for transition in transitions),
             direction=_indices(transition.guard.direction for transition in transitions),
-            affine_guard=_indices(self.emitted.affine_guard),
-            guard_in_series=_indices(self.emitted.guard_in_series),
             programs=self._programs,
             **_program_runners(bool(self.emitted.programs.rows)),
-            first_forcing=_indices(self.emitted.first_forcing),
-            forcing_component=_indices(self.emitted.forcing_component),
-            forcing_kind=_indices(self.emitted.forcing_kind),
-            first_residue=_indices(self.emitted.first_residue),
-            residue_component=_indices(self.emitted.residue_component),
             **_slopes(self.emitted.slope_columns),
-            surface=_indices(self.emitted.surface),
-            orientation=_indices(self.emitted.orientation),
             paired=_indices(is_paired(system, self.emitted, i) for i in range(len(transitions))),
             marker=_indices(transition.is_marker for transition in transitions),
             accumulates_to=_indices(
@@ -296,7 +288,6 @@ class CompiledSystem:
             ),
             propagator=_indices(propagator.kind for propagator in self.emitted.propagators),
             degree=_indices(propagator.degree for propagator in self.emitted.propagators),
-            abrupt=_indices(self.emitted.abrupt),
             bounded=_indices([self.emitted.pulses_excluded(mode) for mode in range(len(system.modes))]),
             fragile=_indices(self.emitted.is_fragile(mode) for mode in range(len(system.modes))),
             steep=_indices(bool(powers) for powers in self.emitted.steep),
@@ -304,8 +295,6 @@ class CompiledSystem:
             field_before=_indices(before for before, _ in self.emitted.crossing),
             field_behind=_indices(behind for _, behind in self.emitted.crossing),
             timed=_indices(self._is_timed(i) for i in range(len(system.modes))),
-            read_by=np.array(self.emitted.read_by, dtype=np.int64),
-            jumping_reset=_indices(self.emitted.jumping_reset),
             conditional=_indices(
                 any(each.source == name and each.guard.when is not None for each in transitions)
                 for name in system.mode_names

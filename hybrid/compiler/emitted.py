@@ -1,11 +1,19 @@
-"""The facts and the code that tracing found for a system; plain data."""
+"""The facts and the code that tracing found for a system; plain data.
+
+A fact has one place, a field of ``Emitted``. What is stored on disk follows from the types of the fields, and
+a fact that kernels read is an array of the same name in their model.
+"""
 
 from __future__ import annotations
 
 import attrs
+import numpy as np
 
 from hybrid.compiler.opaque import OpaqueFunction
 from hybrid.kernels.types.codes import IN_TIME, PROPAGATORS
+
+# What marks a fact that kernels read as an array of whole numbers.
+FOR_KERNELS = {"read by kernels": True}
 
 
 @attrs.frozen
@@ -107,8 +115,6 @@ class Emitted:
         By part of ``hybrid.compiler.parts``: text of a module with the functions of the part. Behind the
         guards, ``guard`` has their conditions; for a guard without one it leaves ``out`` alone. The same
         model gives the same text, in any process.
-    opaque
-        The model functions that tracing could not follow, by their names in the text.
     affine_guard
         By transition: whether the guard's gradient, its slope in time included, is proved to depend on
         parameters only.
@@ -161,35 +167,42 @@ class Emitted:
         By mode: how it is best advanced.
     tangent_start
         The first column of tangent vectors in series.
+    opaque
+        The model functions that tracing could not follow, by their names in the text; not stored.
     """
 
     texts: dict[str, str]
-    opaque: dict[str, OpaqueFunction]
-    affine_guard: tuple[bool, ...]
-    guard_in_series: tuple[bool, ...]
+    affine_guard: tuple[bool, ...] = attrs.field(metadata=FOR_KERNELS)
+    guard_in_series: tuple[bool, ...] = attrs.field(metadata=FOR_KERNELS)
     programs: Programs
-    first_forcing: tuple[int, ...]
-    forcing_component: tuple[int, ...]
-    forcing_kind: tuple[int, ...]
-    first_residue: tuple[int, ...]
-    residue_component: tuple[int, ...]
+    first_forcing: tuple[int, ...] = attrs.field(metadata=FOR_KERNELS)
+    forcing_component: tuple[int, ...] = attrs.field(metadata=FOR_KERNELS)
+    forcing_kind: tuple[int, ...] = attrs.field(metadata=FOR_KERNELS)
+    first_residue: tuple[int, ...] = attrs.field(metadata=FOR_KERNELS)
+    residue_component: tuple[int, ...] = attrs.field(metadata=FOR_KERNELS)
     slope_columns: tuple[tuple[tuple[int, ...], ...], ...]
     traced_field: tuple[bool, ...]
-    surface: tuple[int, ...]
-    orientation: tuple[int, ...]
-    abrupt: tuple[bool, ...]
+    surface: tuple[int, ...] = attrs.field(metadata=FOR_KERNELS)
+    orientation: tuple[int, ...] = attrs.field(metadata=FOR_KERNELS)
+    abrupt: tuple[bool, ...] = attrs.field(metadata=FOR_KERNELS)
     autonomous: tuple[bool, ...]
     discontinuities: tuple[str, ...]
     proved_period: bool
     timed_guard: tuple[bool, ...]
     timed_reset: tuple[bool, ...]
-    read_by: tuple[tuple[int, ...], ...]
-    jumping_reset: tuple[bool, ...]
+    read_by: tuple[tuple[int, ...], ...] = attrs.field(metadata=FOR_KERNELS)
+    jumping_reset: tuple[bool, ...] = attrs.field(metadata=FOR_KERNELS)
     steep: tuple[str, ...]
     steep_inside: tuple[str, ...]
     crossing: tuple[tuple[int, int], ...]
     propagators: tuple[Propagator, ...]
     tangent_start: int
+    opaque: dict[str, OpaqueFunction] = attrs.field(factory=dict)
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The facts that kernels read, by name."""
+        named = (each.name for each in attrs.fields(Emitted) if each.metadata == FOR_KERNELS)
+        return {name: np.array(getattr(self, name), dtype=np.int64) for name in named}
 
     def is_sampled(self, transition: int) -> bool:
         """Whether the crossings of a guard are only sampled, because the guard could not be traced."""

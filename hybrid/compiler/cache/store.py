@@ -7,14 +7,14 @@ import json
 import sys
 from functools import cache
 from pathlib import Path
-from typing import Any
 
-import attrs
+import cattrs
 import numpy as np
+from cattrs.gen import make_dict_structure_fn, make_dict_unstructure_fn, override
 
 from hybrid.compiler.cache.folder import PACKAGE, cache_folder, keep, kept, path_in_cache, source_key
 from hybrid.compiler.cache.loader import kernels_key, sources_in
-from hybrid.compiler.emitted import Emitted, Programs, Propagator, Series
+from hybrid.compiler.emitted import Emitted
 
 
 def models_folder() -> Path:
@@ -34,7 +34,7 @@ def read(operations: str) -> Emitted | None:
 
 def write(operations: str, emitted: Emitted) -> None:
     """Store the results of tracing the system with these operations."""
-    text = json.dumps(attrs.asdict(emitted), default=int)
+    text = json.dumps(_converter().unstructure(emitted), default=int)
     keep(models_folder() / _file(operations), text.encode())
 
 
@@ -66,32 +66,16 @@ def _read(content: bytes | None) -> Emitted | None:
     if content is None:
         return None
     try:
-        found: dict[str, Any] = json.loads(content)
-        of_transitions = ("affine_guard", "guard_in_series", "surface", "orientation")
-        of_modes = ("abrupt", "autonomous", "discontinuities", "traced_field", "steep", "steep_inside")
-        parts = (
-            "first_forcing",
-            "forcing_component",
-            "forcing_kind",
-            "first_residue",
-            "residue_component",
-        )
-        for name in (*of_transitions, *of_modes, "timed_guard", "timed_reset", "jumping_reset", *parts):
-            found[name] = tuple(found[name])
-        for name in ("crossing", "read_by"):
-            found[name] = tuple(map(tuple, found[name]))
-        found["slope_columns"] = tuple(tuple(map(tuple, rows)) for rows in found["slope_columns"])
-        names = ("rows", "checked", "numbers", "first")
-        rows, checked, numbers, first = (found["programs"][name] for name in names)
-        found["programs"] = Programs(
-            tuple(map(tuple, rows)), tuple(checked), tuple(map(float, numbers)), tuple(first)
-        )
-        found["propagators"] = tuple(map(_propagator, found["propagators"]))
-        return Emitted(**found)
-    except (ValueError, LookupError, TypeError):
+        return _converter().structure(json.loads(content), Emitted)
+    except (ValueError, LookupError, TypeError, AttributeError, cattrs.BaseValidationError):
         return None
 
 
-def _propagator(found: dict[str, Any]) -> Propagator:
-    series = Series(**{**found["series"], "statements": (), "tangent_statements": ()})
-    return Propagator(**{**found, "series": series, "guards": tuple(found["guards"])})
+@cache
+def _converter() -> cattrs.Converter:
+    """What turns records into plain data, and back; functions that were not traced stay here."""
+    converter = cattrs.Converter()
+    left = override(omit=True)
+    converter.register_unstructure_hook(Emitted, make_dict_unstructure_fn(Emitted, converter, opaque=left))
+    converter.register_structure_hook(Emitted, make_dict_structure_fn(Emitted, converter, opaque=left))
+    return converter
