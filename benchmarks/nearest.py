@@ -16,7 +16,7 @@ NEAREST = {
         "compiler/cache/test_store.py",
     ),
     "hybrid/compiler/cache/seal.py": ("compiler/cache/test_folder.py",),
-    "hybrid/compiler/emit.py": ("symbolic/test_continuity.py",),
+    "hybrid/compiler/emit.py": ("expression/test_continuity.py",),
     "hybrid/compiler/emitted.py": (
         "compiler/bounds/test_forcing.py",
         "kernels/events/test_proved_crossings.py",
@@ -270,14 +270,11 @@ NEAREST = {
     "hybrid/sweep/many.py": ("sweep/test_many_statuses.py",),
     "hybrid/sweep/rows.py": ("sweep/test_many.py", "../lyapunov/test_chart.py"),
     "hybrid/sweep/sheet.py": ("sweep/test_outcome.py", "sweep/test_sweep.py"),
-    "hybrid/expression/expressions.py": (
-        "symbolic/test_tracing.py",
-        "symbolic/test_derivatives.py",
-        "compiler/taylor/test_series.py",
-    ),
-    "hybrid/expression/tracing.py": ("symbolic/test_tracing.py",),
-    "hybrid/expression/ufuncs.py": ("symbolic/test_tracing.py", "compiler/test_operations.py"),
-    "hybrid/expression/values.py": ("symbolic/test_tracing.py", "compiler/test_operations.py"),
+    "hybrid/expression/nodes.py": ("expression/test_operations.py", "expression/test_derivatives.py"),
+    "hybrid/expression/operations.py": ("expression/test_derivatives.py", "compiler/taylor/test_series.py"),
+    "hybrid/expression/tracing.py": ("expression/test_values.py",),
+    "hybrid/expression/ufuncs.py": ("expression/test_tracing.py", "compiler/test_operations.py"),
+    "hybrid/expression/values.py": ("expression/test_tracing.py", "compiler/test_operations.py"),
     "hybrid/system/functions.py": (
         "system/test_derivatives.py",
         "system/test_elements.py",
