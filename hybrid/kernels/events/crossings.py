@@ -12,7 +12,6 @@ from typing import NamedTuple
 from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT, crosses_towards
-from hybrid.kernels.events.beside import MOST_MOMENTS, signs_beside
 from hybrid.kernels.events.guards import (
     error_band,
     has_program,
@@ -20,12 +19,11 @@ from hybrid.kernels.events.guards import (
     was_left_behind,
 )
 from hybrid.kernels.events.hidden import hidden_until
+from hybrid.kernels.events.moments import Place, sign_along
 from hybrid.kernels.events.onset import (
-    BY_SPEED,
-    BY_STEP,
-    JUMPING,
+    AT_REST,
+    LATER,
     has_just_fired,
-    is_zero,
     known_part,
     side_is_certain,
 )
@@ -112,14 +110,14 @@ def _returns(model, run, transition, path, known, work):
 def _known_at_start(model, transition, path, begin, work):
     """What is known of a guard at the start of a step, and whether it leaves to its side for certain."""
     on_guard, sure, base, tilt = begin.on_guard, 0.0, 0.0, 0.0
-    leaves = on_guard == JUMPING and begin.hidden > 0.0
+    leaves = on_guard == LATER and begin.hidden > 0.0
     if leaves:
         sure = begin.hidden
-    if is_zero(on_guard):
+    elif on_guard > 0:
         row = work.registers[row_at(model, transition, path, 0.0, NOTHING, work)]
         least, most = row[LEAST_SLOPE], row[MOST_SLOPE]
         base, tilt = known_part(middle_of(row), 0.5 * (least + most), on_guard)
-        leaves = on_guard == BY_SPEED and side_is_certain(on_guard, least, most)
+        leaves = side_is_certain(on_guard, least, most)
     return Known(begin.side, on_guard, sure, base, tilt), leaves
 
 
@@ -129,7 +127,7 @@ def _first_place(model, run, path, begin):
     if begin.on_guard == 0:
         return 0.0
     place = max(begin.hidden, SETTLED * path.length)
-    if begin.on_guard == JUMPING and not begin.hidden > 0.0:
+    if begin.on_guard == LATER and not begin.hidden > 0.0:
         # By rounding the state may still be before the jump.
         beyond = rounding_of_start(path, model.dimension, run.scale, size_of_time(model, path.start))
         place = max(place, min(beyond, 0.5 * path.length))
@@ -235,15 +233,18 @@ def first_change(model, method, run, transition, path, begin, work):
 def _begin(model, method, run, transition, path, end, work):
     """How a guard begins on a step (``Begin``), and whether it rests at zero throughout."""
     side, on_guard, hidden, rests = run.side[transition], run.on_guard[transition], 0.0, False
-    if on_guard == BY_STEP:
+    if on_guard == AT_REST:
         hidden, rests = hidden_until(model, method, run, transition, path, end, work)
-    if on_guard == JUMPING and has_just_fired(run, transition, on_guard):
-        model.field(run.mode, path.start, run.y, model.parameters, work.field)
-        _, beside, moment = signs_beside(model, run, transition, path.start, run.y, MOST_MOMENTS, work)
-        rate = pace_at_start(path)
+    if on_guard == LATER:
+        t, rate = path.start, pace_at_start(path)
+        model.field(run.mode, t, run.y, model.parameters, work.field)
+        beside, moment, _ = sign_along(model, run, transition, Place(run.mode, t, run.y), 1.0, work)
         if beside == side and rate > 0.0:
             # Up to there the state may be on either side by rounding.
             hidden = min(moment / rate, 0.5 * path.length)
+            if not path.exact:
+                later, _ = hidden_until(model, method, run, transition, path, end, work)
+                hidden = max(hidden, min(later, 0.5 * path.length))
     return Begin(side, on_guard, hidden), rests
 
 
@@ -252,7 +253,7 @@ def crossing_on_path(model, method, run, transition, path, end, work):
     """``first_change`` from the side that the run knows; ``sampled_change`` if the guard has no program.
 
     ``end`` is the value of a guard at the end of the step, which the path may hold with other rounding; only
-    one of the order ``BY_STEP`` needs it.
+    one that has left zero other than by its speed needs it.
     Returns the share of the step at which the guard crosses, its side after the crossing or at the end, and
     the share of the step that is proved. The guard is no longer held to be zero at the start of the step,
     unless it rests there.

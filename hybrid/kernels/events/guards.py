@@ -13,8 +13,6 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 ROUNDING_OF_STATE = 16
 # How far from zero a jump may leave a guard, as a multiple of its rounding band.
 LEFT_BEHIND = 16.0
-# A guard within rounding of zero jumps if it exceeds this many times the rounding that its gradient predicts.
-SMOOTH = 4.0
 # The row of ``work.rounding`` for a place beside the state.
 PLACE = 3
 
@@ -167,18 +165,6 @@ def spread_of_terms(model, run, program, share, t, x, work):
     clock = size_of_time(model, t)
     spread = model.spread(model.programs, program, t, clock, x, run.scale, share, work.registers)
     return spread if 0.0 < spread < math.inf else 0.0
-
-
-@njit(**KERNEL)
-def exceeds_slope(model, run, transition, t, x, value, work):
-    """Whether a guard that has a program is larger than its slope lets rounding make it, as beside a jump.
-
-    The large terms of a guard may leave a flat slope, and more rounding than the slope tells.
-    """
-    band = smooth_band(model, run, transition, t, x, work)
-    if not may_jump(model, run, transition, t, x, work):
-        band += spread_of_terms(model, run, transition, 0.0, t, x, work)
-    return abs(value) > SMOOTH * band
 
 
 @njit(**KERNEL)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from numba import njit
 
 from hybrid.kernels.events.hidden import sample
-from hybrid.kernels.events.onset import is_zero, side_is_certain
+from hybrid.kernels.events.onset import LATER, side_is_certain
 from hybrid.kernels.events.sampled import NOWHERE
 from hybrid.kernels.types.codes import HIGH, HIGH_MIDDLE, LEAST_SLOPE, LOW, LOW_MIDDLE, MOST_SLOPE
 from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH
@@ -163,7 +163,7 @@ def known_at(model, transition, path, place, side, known, work):
 def _begins_on_side(model, transition, path, high, known, work):
     """Whether a guard is on its side at the start of a step, if it is not at ``high``."""
     row = work.registers[row_at(model, transition, path, 0.0, known, work)]
-    if is_zero(known.on_guard):
+    if known.on_guard > 0 and known.on_guard != LATER:
         begins = side_is_certain(known.on_guard, row[LEAST_SLOPE], row[MOST_SLOPE])
         value = middle_of(row)
     else:

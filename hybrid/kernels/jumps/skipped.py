@@ -5,7 +5,6 @@ from numba import njit
 from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.arithmetic.slopes import spread_of_rate
 from hybrid.kernels.events.crossings import Begin, first_change
-from hybrid.kernels.events.derivatives import speed_rounding
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
     guard_speed,
@@ -14,6 +13,7 @@ from hybrid.kernels.events.guards import (
     rounding_band,
     size_of_time,
 )
+from hybrid.kernels.events.moments import speed_rounding
 from hybrid.kernels.events.sampled import NOWHERE
 from hybrid.kernels.jumps.rounds import fired_before, mark_endless
 from hybrid.kernels.types.codes import ENDLESS

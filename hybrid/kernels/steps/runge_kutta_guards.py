@@ -17,13 +17,12 @@ from hybrid.kernels.events.crossings import crossing_on_path
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
     error_band,
-    guard_acceleration,
     guard_speed,
     guard_value,
     rounding_band,
 )
 from hybrid.kernels.events.hidden import hidden_share
-from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP, has_just_fired
+from hybrid.kernels.events.onset import AT_REST, BY_SPEED, LATER, has_just_fired
 from hybrid.kernels.events.resolution import (
     MARGIN,
     field_holds,
@@ -125,7 +124,7 @@ def asks_error(run, on_guard):
 
     A guard that has stayed within rounding of zero on the steps before has other derivatives by now.
     """
-    return on_guard in (BY_SPEED, BY_ACCELERATION) and run.since_entry == 0.0
+    return on_guard == BY_SPEED and run.since_entry == 0.0
 
 
 @njit(**KERNEL)
@@ -142,14 +141,12 @@ def outweighs_error(model, run, growth, h, work):
 
 
 @njit(**KERNEL)
-def leaves_as_known(model, run, transition, on_guard, t, h, work):
+def leaves_as_known(model, run, transition, t, h, work):
     """``outweighs_error`` for a guard that is no polynomial on the step."""
     for i in range(model.dimension):
         work.field[i] = work.stages[0, i]
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
     growth = h * speed
-    if on_guard == BY_ACCELERATION:
-        growth = 0.5 * h * h * guard_acceleration(model, run, transition, run.mode, t, run.y, work)
     return math.isnan(growth) or outweighs_error(model, run, growth * run.side[transition], h, work)
 
 
@@ -186,7 +183,7 @@ def crossing_of_affine(model, method, run, transition, path, end, work):
     """Where an affine guard crosses on a step, and its side after.
 
     Returned first is whether the guard may have left its side, and last whether the error of the step hides
-    that. ``end`` is the value at the end of the step of a guard of the order ``BY_STEP``.
+    that. ``end`` is the value at the end of the step of a guard that has not left zero by its speed.
     """
     t, h, hidden = path.start, path.pace, 0.0
     on_guard, side = run.on_guard[transition], run.side[transition]
@@ -198,11 +195,11 @@ def crossing_of_affine(model, method, run, transition, path, end, work):
         if largest_magnitude(work.polynomial, degree) <= band:
             return False, NO_ROOT, side, False
         run.on_guard[transition] = 0
-        if on_guard == BY_STEP:
+        if on_guard >= LATER:
             hidden = hidden_share(work.polynomial, degree, band, error, end, work.stack)
-            if has_just_fired(run, transition, on_guard):
+            if on_guard == AT_REST and has_just_fired(run, transition, on_guard):
                 side = 0
-    known_roots = on_guard if on_guard != BY_STEP else 0
+    known_roots = 1 if on_guard == BY_SPEED else 0
     for _ in range(known_roots):
         degree = divide_by_theta(work.polynomial, degree)
     if stays(work.polynomial, degree, side, error):
@@ -212,7 +209,7 @@ def crossing_of_affine(model, method, run, transition, path, end, work):
     theta, side = first_crossing(work.polynomial, degree, side, direction, work.stack)
     if theta != NO_ROOT or side != before:
         keep_passage(run, transition, direction, work.polynomial, degree, before, hidden, work.stack)
-    if on_guard == BY_STEP:
+    if on_guard >= LATER:
         theta += hidden * (1.0 - theta) if 0.0 < theta < NO_ROOT else 0.0
         degree = affine_polynomial(model, method, transition, t, h, run.y, 0.0, work)
     note_touches(run, transition, degree, known_roots, hidden, theta, error, work)
@@ -223,14 +220,14 @@ def crossing_of_affine(model, method, run, transition, path, end, work):
 def crossing_on_step(model, method, run, transition, path, work):
     """Where a guard crosses, the share of the step that is proved, and whether the crossing is resolved."""
     t, h, on_guard, share = path.start, path.pace, run.on_guard[transition], 1.0
-    end = guard_value(model, transition, t + h, work.new, work.scalar) if on_guard == BY_STEP else 0.0
+    end = guard_value(model, transition, t + h, work.new, work.scalar) if on_guard >= LATER else 0.0
     if model.affine_guard[transition] == 1:
         leaves, theta, side, unsure = crossing_of_affine(model, method, run, transition, path, end, work)
         if not leaves:
             return NO_ROOT, 1.0, True
     else:
         known = asks_error(run, on_guard)
-        unsure = known and not leaves_as_known(model, run, transition, on_guard, t, h, work)
+        unsure = known and not leaves_as_known(model, run, transition, t, h, work)
         theta, side, share = crossing_on_path(model, method, run, transition, path, end, work)
     if underflows(model, transition, t, run.y, t + h, work.new, work.scalar):
         return NO_ROOT, share, True

@@ -21,7 +21,7 @@ from hybrid.kernels.events.guards import (
     size_of_time,
 )
 from hybrid.kernels.events.hidden import hidden_share
-from hybrid.kernels.events.onset import BY_STEP, has_just_fired
+from hybrid.kernels.events.onset import AT_REST, LATER, has_just_fired
 from hybrid.kernels.events.path import time_at
 from hybrid.kernels.events.resolution import (
     MARGIN,
@@ -336,15 +336,15 @@ def sought(model, method, run, transition, column, path, work):
     # A value that is small for a guard is less small for the root of the guard.
     rounding, band = as_root(model, mode, rounding), as_root(model, mode, band)
     # The root of a guard that is zero without speed begins to grow like its variable, too.
-    known = min(on_guard, 1) if kind in (DESINGULARISED, ROOTED) else on_guard
-    noisy = on_guard == BY_STEP and kind != EXACT
+    known = min(on_guard, 1)
+    noisy = on_guard >= LATER and kind != EXACT
     if noisy:
         # Where terms of the field cancel, the first powers are rounding.
         known = 0
-    elif on_guard == BY_STEP:
+    elif on_guard >= LATER:
         size = path.powers[path.degree + 2, column]
         known = leading_power(path.powers, column, path.degree, path.length, known, size)
-    if on_guard == BY_STEP and has_just_fired(run, transition, on_guard):
+    if on_guard == AT_REST and has_just_fired(run, transition, on_guard):
         side = 0
     return Sought(transition, column, on_guard, side, known, noisy, rounding, band)
 

@@ -1,0 +1,153 @@
+"""The sign of a guard along the flow, a moment before or after a place where rounding hides it.
+
+A guard that rounding cannot tell from zero is on the side to which the flow takes it: it has the sign of
+the first moment at which rounding no longer hides it. That holds for a guard that leaves zero by its speed,
+by its acceleration or by a higher derivative, at a kink, and where the guard jumps: no derivative is needed.
+
+The moments grow from the rounding of the time. Each is one step of the classical Runge-Kutta method, whose
+error goes with the fifth power of the step. Up to the fifth root of rounding, in units of the time in which
+the state changes by its size, that error is less than rounding. A guard that is still hidden then is at rest.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+from numba import njit
+
+from hybrid.kernels.arithmetic.slopes import spread_of_rate
+from hybrid.kernels.events.guards import (
+    ROUNDING_OF_STATE,
+    guard_speed,
+    guard_value,
+    rounding_band,
+    size_of_time,
+    slopes_at_guard,
+    spread_of_terms,
+)
+from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.options import INLINE, KERNEL
+
+# Relative rounding of a state.
+SHARE = ROUNDING_OF_STATE * EPSILON
+# Each moment is so many times as long as the last.
+LONGER = 16.0
+# The longest moment, in units of the time in which the state changes by its size.
+LONGEST = EPSILON**0.2
+# A guard leaves zero by its speed if that keeps this share of itself until the guard is clear of zero: until
+# the speed has moved it by so many times its rounding.
+BY_ITS_SPEED = 0.5
+CLEAR = 2.0 / BY_ITS_SPEED
+
+
+class Place(NamedTuple):
+    """Where a run is: its mode, the time ``t`` and the state ``x (n,)``."""
+
+    mode: Any
+    t: Any
+    x: Any
+
+
+@njit(**INLINE)
+def unit_of_time(model, run, work):
+    """The time in which the state changes by its size; 0 for a state at rest. ``work.field`` is current."""
+    size, pace = 0.0, 0.0
+    for i in range(model.dimension):
+        if work.field[i] != 0.0:
+            size, pace = max(size, run.scale[i]), max(pace, abs(work.field[i]))
+    return size / pace if pace > 0.0 else 0.0
+
+
+@njit(**INLINE)
+def moment_of_rounding(model, run, t, work):
+    """The time in which the state moves as far as its rounding; ``work.field`` is current."""
+    return EPSILON * max(unit_of_time(model, run, work), size_of_time(model, t))
+
+
+@njit(**KERNEL)
+def speed_rounding(model, run, transition, mode, t, x, work):
+    """How far rounding of state and time can move the speed of a guard along its gradient.
+
+    ``work.field`` and ``work.gradient`` are current. Terms in time and parameters alone that may cancel have
+    programs of their own (``Model.residue_component``).
+    """
+    n, gradient, total = model.dimension, work.gradient, abs(work.gradient[model.dimension])
+    slopes_at_guard(model, run, transition, mode, t, x, work)
+    for i in range(n):
+        if gradient[i] != 0.0:
+            spread = abs(work.field[i]) + abs(work.jacobian[i, n]) * size_of_time(model, t)
+            spread += spread_of_rate(model, mode, i, work.jacobian, run.scale)
+            total += abs(gradient[i]) * spread
+    first, cancelling = model.target.shape[0] + model.first_forcing[-1], 0.0
+    for residue in range(model.first_residue[mode], model.first_residue[mode + 1]):
+        slope = abs(gradient[model.residue_component[residue]])
+        if slope != 0.0:
+            cancelling += slope * spread_of_terms(model, run, first + residue, SHARE, t, x, work)
+    return SHARE * total + cancelling
+
+
+@njit(**KERNEL)
+def move_for(model, mode, t, x, moment, out, work):
+    """The state a ``moment`` after ``t``, or before, into ``out (n,)``.
+
+    ``work.field`` is that at ``x (n,)``. Where the field has no value the flow goes straight on.
+    """
+    n, place, rate = model.dimension, work.state, work.field_after
+    for i in range(n):
+        place[i], out[i] = x[i] + 0.5 * moment * work.field[i], x[i] + moment / 6.0 * work.field[i]
+    for stage in range(3):
+        later = t + (0.5 if stage < 2 else 1.0) * moment
+        model.field(mode, later, place, model.parameters, rate)
+        for i in range(n):
+            place[i] = x[i] + (0.5 if stage == 0 else 1.0) * moment * rate[i]
+            out[i] += moment * (1.0 / 6.0 if stage == 2 else 1.0 / 3.0) * rate[i]
+    for i in range(n):
+        if math.isnan(out[i]):
+            for j in range(n):
+                out[j] = x[j] + moment * work.field[j]
+            break
+
+
+@njit(**KERNEL)
+def keeps_speed(model, transition, place, way, speed, moment, work):
+    """Whether a guard keeps half of its ``speed`` until the ``moment`` at which it is clear of zero.
+
+    ``work.field`` and ``work.gradient`` are current.
+    """
+    mode, t, x = place
+    for i in range(model.dimension):
+        work.settled[i] = x[i] + way * moment * work.field[i]
+    model.field(mode, t + way * moment, work.settled, model.parameters, work.field_after)
+    then = guard_speed(model, transition, t + way * moment, work.settled, work.field_after, work.gradient)
+    return then * speed > BY_ITS_SPEED * speed * speed
+
+
+@njit(**KERNEL)
+def sign_along(model, run, transition, place, way, work):
+    """The sign of a guard along the flow, and the first moment when it is certain; zeros if there is none.
+
+    ``way`` is 1 for what comes after the ``place`` of a run, and -1 for what came before. Third comes whether
+    the speed of the guard at the place explains the sign. ``work.field`` is current, and is on return. The
+    state at the moment is left in ``work.settled``.
+    """
+    mode, t, x = place
+    speed = guard_speed(model, transition, t, x, work.field, work.gradient)
+    drift = speed_rounding(model, run, transition, mode, t, x, work)
+    shortest = moment_of_rounding(model, run, t, work)
+    longest = max(LONGEST * unit_of_time(model, run, work), EPSILON * size_of_time(model, t))
+    if drift < abs(speed) < math.inf:
+        band = rounding_band(model, run, transition, t, x, work)
+        moment = max(CLEAR * band / abs(speed), shortest)
+        if moment <= longest and keeps_speed(model, transition, place, way, speed, moment, work):
+            return (1 if speed * way > 0.0 else -1), moment, True
+    least, moment = drift if drift < math.inf else 0.0, LONGER * shortest
+    while moment <= longest:
+        later = t + way * moment
+        move_for(model, mode, t, x, way * moment, work.settled, work)
+        value = guard_value(model, transition, later, work.settled, work.scalar)
+        if abs(value) > moment * least:
+            model.guard_gradient(transition, later, work.settled, model.parameters, work.gradient)
+            band = rounding_band(model, run, transition, later, work.settled, work)
+            if abs(value) > band + moment * least:
+                return (1 if value > 0.0 else -1), moment, False
+        moment *= LONGER
+    return 0, 0.0, False
