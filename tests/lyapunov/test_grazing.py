@@ -84,4 +84,5 @@ def test_a_spectrum_with_grazed_jumps_says_so():
     p = beyond_grazing(1e-12)
     spectrum = lyapunov_spectrum(impact_oscillator(), (0.0, 0.0), parameters=p, k=1, intervals=400)
     assert "jumps grazed within the tolerances" in spectrum.status.message
+    assert "to the first exponent" in spectrum.status.message
     assert -0.1 < spectrum.exponents[0] < 0.02

@@ -227,6 +227,16 @@ def test_bad_arguments(arguments, message):
         lyapunov.lyapunov_spectrum(models.impact_oscillator(), (0.0, 0.0), **arguments)
 
 
+@pytest.mark.parametrize("exponents", [lyapunov.lyapunov_spectrum, lyapunov.two_orbit_exponents])
+def test_an_interval_is_many_roundings_of_the_time(exponents):
+    """Times near ``2**52`` are 1 apart. The message counts the intervals of the transient too."""
+    late = {"t0": 2.0**52, "intervals": 5, "transient": 2}
+    with pytest.raises(
+        hybrid.ArgumentError, match=r"with t0 = 4503599627370496\.0 and 7 intervals times are"
+    ):
+        exponents(models.bouncing_ball(), (1.0, 0.0), interval=1.0, **late)
+
+
 def test_bad_state():
     with pytest.raises(hybrid.ArgumentError, match="'v' must be finite; got nan"):
         lyapunov.lyapunov_spectrum(models.impact_oscillator(), (0.0, np.nan))

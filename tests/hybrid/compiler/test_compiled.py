@@ -1,16 +1,11 @@
 """From a model to machine code and a graph of indices."""
 
-from types import SimpleNamespace
-
 import attrs
 import numpy as np
 import pytest
 
 import hybrid
 from hybrid import Guard, HybridSystem, Mode, Transition, compile_system
-from hybrid.compiler import compiled as compiling
-from hybrid.compiler import emit
-from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.parts import EVENTS, FIELDS, PARTS, SERIES, TANGENT_SERIES, VARIATIONAL
 from hybrid.kernels.types.codes import DESINGULARISED, EXACT
 from hybrid.system.functions import field_function, guard_function
@@ -62,34 +57,6 @@ def test_what_tracing_proves():
     assert not emitted.opaque
 
 
-def test_graph_as_indices():
-    model = compile_system(vibroimpact()).model({"omega": 8.0})
-    np.testing.assert_array_equal(model.first_outgoing, [0, 1, 2])
-    np.testing.assert_array_equal(model.outgoing, [0, 1])
-    np.testing.assert_array_equal(model.target, [1, 0])
-    np.testing.assert_array_equal(model.direction, [1, -1])
-    assert model.surface[0] == model.surface[1]
-    np.testing.assert_array_equal(model.paired, [0, 0])
-    np.testing.assert_array_equal(model.marker, [0, 0])
-    assert model.period == pytest.approx(2 * np.pi / 8)
-    assert compile_system(bouncing_ball()).model().period == 0.0
-
-
-def test_roles_are_the_model_functions():
-    system = impact_oscillator()
-    compiled = compile_system(system)
-    assert set(compiled.functions(FIELDS)) == set(PARTS[FIELDS])
-    t, x, p = 0.7, np.array([0.3, -0.5]), compiled.model().parameters
-    out = np.empty(2)
-    kernels = load_kernels("hybrid.kernels.steps.step")
-    kernels.field_at(compiled.model(), 0, t, x, out)
-    np.testing.assert_allclose(out, [-0.5, np.cos(0.7) + 0.05 - 0.3])
-    jacobian = np.empty((2, 3))
-    kernels.jacobian_at(compiled.model(), 0, t, x, jacobian)
-    np.testing.assert_allclose(jacobian, [[0.0, 1.0, 0.0], [-1.0, -0.1, -np.sin(0.7)]])
-    assert len(p) == 6
-
-
 def test_a_run_compiles_only_what_it_needs():
     system = impact_oscillator()
     parts = compile_system(system).parts
@@ -131,63 +98,6 @@ def test_a_function_that_cannot_be_compiled():
         hybrid.ModelError, match=r"Mode 'a': field cannot be .*use np.sin in place of math.sin"
     ):
         compile_system(sine)
-
-
-def test_modes_whose_field_or_guard_depends_on_time_are_timed():
-    """A guard makes the mode timed that it is in, not the others."""
-    fields = {"still": lambda t, x, p: (1.0,), "driven": lambda t, x, p: (np.cos(t),)}
-    guards = {"place": lambda t, x, p: x.x - 1.0, "moment": lambda t, x, p: t - 1.0}
-    names = [f"{field} {guard}" for field in fields for guard in guards]
-    following = dict(zip(names, [*names[1:], names[0]], strict=True))
-    system = HybridSystem(
-        state=("x",),
-        modes=[Mode(name, fields[name.split()[0]]) for name in names],
-        transitions=[
-            Transition(name, following[name], Guard(guards[name.split()[1]], +1), name=f"leave {name}")
-            for name in reversed(names)
-        ],
-    )
-    assert compile_system(system).model().timed.tolist() == [0, 1, 1, 1]
-
-
-@pytest.mark.parametrize(
-    ("operations", "opaque"), [("ops", False), ("ops", True), (None, False), (None, True)]
-)
-def test_what_is_stored_is_what_another_process_can_read(operations, opaque, monkeypatch):
-    """Functions that are compiled as they are cannot be stored, nor what has no key."""
-    written = []
-    emitted = SimpleNamespace(opaque={"model_0": 1} if opaque else {})
-    monkeypatch.setattr(compiling, "operations_of", lambda system: operations)
-    monkeypatch.setattr(compiling.store, "read", lambda key: None)
-    monkeypatch.setattr(compiling.store, "write", lambda *both: written.append(both))
-    monkeypatch.setattr(emit, "emit", lambda system: emitted)
-    assert compiling.emitted_of("system") is emitted
-    assert written == ([] if operations is None or opaque else [("ops", emitted)])
-
-
-def test_what_was_stored_is_read(monkeypatch):
-    monkeypatch.setattr(compiling, "operations_of", lambda system: "ops")
-    monkeypatch.setattr(compiling.store, "read", lambda key: f"found {key}")
-    assert compiling.emitted_of("system") == "found ops"
-
-
-@pytest.mark.parametrize(("frequency", "fault"), [(2.0, False), (3.0, True)])
-def test_a_period_that_is_not_proved_is_examined_at_each_value_once(frequency, fault, monkeypatch):
-    """The field has the period ``pi`` where the frequency is even."""
-    field = lambda t, x, p: (np.cos(p.w * t),)  # noqa: E731
-    system = HybridSystem(state=("q",), parameters={"w": 2.0}, modes=[Mode("m", field)])
-    found = SimpleNamespace(periodic_at=set(), system=system)
-    values = np.array([frequency])
-    check = lambda: compiling.CompiledSystem._check_period(found, values, np.pi)  # noqa: E731
-    if fault:
-        with pytest.raises(hybrid.ArgumentError):
-            check()
-        assert not found.periodic_at
-    else:
-        check()
-        monkeypatch.setattr(compiling, "period_fault", None)
-        check()
-        assert found.periodic_at == {values.tobytes()}
 
 
 def test_derivatives_have_one_column_per_state_and_one_for_time():

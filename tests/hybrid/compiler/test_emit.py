@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from hybrid.compiler.compiled import compile_system
-from hybrid.compiler.emit import _placed, _places, _power_of_two_from, emit
-from hybrid.compiler.emitted import Series
+from hybrid.compiler.emit import emit
 from hybrid.compiler.llvm.functions import compiled_part, own_functions
 from hybrid.compiler.parts import EVENTS, FIELDS, PARTS
 from hybrid.errors import ModelError
@@ -413,32 +412,6 @@ class TestPlainFunctions:
         assert not compile_system(system).emitted.opaque
 
 
-def test_a_guard_of_the_start_is_no_column_of_the_series():
-    """It is listed between two guards of the series and does not shift their columns."""
-    crossed = {
-        name: Transition("run", "run", Guard(value, +1), name=name)
-        for name, value in (("sine", lambda t, x, p: np.sin(x.q) - 0.3), ("line", lambda t, x, p: x.q - 1))
-    }
-    start = Transition("run", None, Guard(lambda t, x, p: x.q - 9, +1, at_start=True), name="start")
-    system = HybridSystem(
-        state=("q", "v"),
-        modes=[Mode("run", lambda t, x, p: (x.v, -(x.q**3)))],
-        transitions=[crossed["sine"], start, crossed["line"]],
-    )
-    assert emit(system).guard_in_series == (False, False, True)
-
-
-@pytest.mark.parametrize(("tangents", "groups"), [(0, 0), (1, 1), (4, 1), (5, 2), (8, 2), (9, 3)])
-def test_columns_of_tangent_vectors_come_in_fours(tangents, groups):
-    system = HybridSystem(state=("q", "v"), modes=[Mode("run", lambda t, x, p: (x.v, -(x.q**3)))])
-    compiled = compile_system(system)
-    [mode] = compiled.emitted.propagators
-    assert (
-        compiled.series_columns(tangents)
-        == compiled.emitted.tangent_start + groups * mode.series.tangent_columns
-    )
-
-
 def test_guards_that_are_not_affine_have_programs():
     """They are bounded by interval arithmetic; where an affine one crosses follows from its polynomial."""
     values = {
@@ -465,27 +438,3 @@ def test_guards_that_are_not_affine_have_programs():
     assert emitted.timed_reset == (False, False, False, True)
     rows = np.diff(emitted.programs.first)[:4]
     assert (rows > 0).tolist() == [False, True, False, True]
-
-
-class TestPlaces:
-    """Columns of the series of two modes in one matrix; the widest register has eight."""
-
-    series = (Series(columns=3, table_columns=4), Series(columns=5, table_columns=8))
-
-    def test_one_behind_the_other(self):
-        found = _places(self.series, with_room=False)
-        assert (found.tables, found.vectors) == ((5, 9), 24)
-
-    def test_with_room_for_further_modes(self):
-        found = _places(self.series, with_room=True)
-        assert (found.tables, found.vectors) == ((8, 12), 32)
-
-    def test_each_body_knows_its_columns_and_none_has_none(self):
-        places = _places(self.series, with_room=False)
-        bodies = _placed(places, [("a = 1", "b = 2"), ()])
-        assert bodies == [["table = 5", "vectors = 24", "a = 1", "b = 2"], []]
-
-    def test_powers_of_two(self):
-        assert [_power_of_two_from(count) for count in (1, 2, 3, 4, 5, 8, 9, 16, 17)] == [
-            *(1, 2, 4, 4, 8, 8, 16, 16, 32)
-        ]

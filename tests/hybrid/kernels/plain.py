@@ -2,8 +2,6 @@
 
 from types import FunctionType, SimpleNamespace
 
-import numpy as np
-
 
 def plain(module, **replaced):
     """The kernels of a module as Python functions that call each other.
@@ -24,23 +22,3 @@ def _names(name, values, known, replaced):
                 known[name][key] = FunctionType(function.__code__, others, key, function.__defaults__)
         known[name] |= replaced
     return known[name]
-
-
-def run_at_guards(y, sides, on_guard=None, fired=-1):
-    """A run at ``y`` in the second of two modes, whose guards are all but the first and have these sides.
-
-    What a search for crossings writes holds numbers that it does not write.
-    """
-    guards = len(sides)
-    return SimpleNamespace(
-        mode=1,
-        y=y,
-        side=np.array([9, *sides]),
-        on_guard=np.array([9, *(on_guard or [0] * guards)]),
-        rehearsal=np.full((4, 1 + guards), 88),
-        passed=np.full(1 + guards, 88.0),
-        last_fired=fired,
-        since_entry=0.0,
-        grazing_place=0.5,
-        next_grazing=0.6,
-    )

@@ -1,86 +1,66 @@
-"""Which mode a run starts in, from the verdicts of the guards on the start."""
+"""Which mode a run starts in: the one that is named, or the only one whose guards allow the start."""
 
-import math
-from types import SimpleNamespace
+from functools import cache
+from operator import attrgetter
 
 import numpy as np
 import pytest
 
 from hybrid import ArgumentError, Guard, HybridSystem, Mode, Reset, Transition, from_equations, simulate
-from hybrid.kernels.types.codes import BEYOND, LEAVES, NO_TRANSITION
-from hybrid.simulation import initial_mode
-from hybrid.simulation.initial_mode import choose_mode
-from hybrid.system.growth import Unexplored
 
-# Transitions by name, with the mode that each leaves, and the transition of the user's that it is a part of.
-OUT = {"ab": ("a", "ab"), "ac": ("a", "ac"), "bc": ("b", "bc"), "ca": ("c", "ca")}
-SPLIT = {"up": ("m, q<0", None), "down": ("m, q>0", None), "hit": ("m, q>0", "hit"), "ca": ("c", "ca")}
+# At ``q = 0`` with ``q' = 1`` the guard of a transition with this place is crossed, crosses at once,
+# is ahead, or has no value.
+BEYOND, LEAVES, AHEAD, UNDEFINED = -1.0, 0.0, 1.0, 3.0
 
 
-@pytest.fixture
-def choose(monkeypatch):
-    """`choose_mode` with given verdicts, by name of a transition; nan for a guard without a value."""
+def rising(name):
+    """Positive beyond its place, and nan where that is above 2."""
+    place = attrgetter(name)
+    return Guard(lambda t, x, p: (x.q - place(p)) * np.sqrt(2.0 - place(p)), +1)
 
-    def chosen(verdicts, mode=None, out=OUT, modes=("a", "b", "c"), growth=None):
-        def try_modes(parts, model, run, work, first, stop, found):
-            for index, (name, (source, _)) in enumerate(out.items()):
-                if modes.index(source) in range(first, stop) and name in verdicts:
-                    if math.isnan(verdicts[name]):
-                        work.scalar[0] = math.nan
-                        return index
-                    found[index] = verdicts[name]
-            return NO_TRANSITION
 
-        monkeypatch.setattr(initial_mode, "move_alike", lambda *_: False)
-        monkeypatch.setattr(initial_mode, "load_kernels", lambda name: SimpleNamespace(try_modes=try_modes))
-        system = SimpleNamespace(
-            mode_names=modes,
-            modes=[SimpleNamespace(name=m, part_of=m.split(",")[0] if "," in m else None) for m in modes],
-            dimension=2,
-            transition_names=tuple(out),
-            transitions=[SimpleNamespace(name=n, source=s, part_of=part) for n, (s, part) in out.items()],
-            parts_of=lambda name: [i for i, each in enumerate(modes) if each.split(",")[0] == name],
-            growth=growth,
-        )
-        run = SimpleNamespace(phase=0.5, y=np.array([1.0, 2.0, 0.0]))
-        work = SimpleNamespace(scalar=np.zeros(1))
-        return choose_mode(system, None, None, run, work, mode)
+@cache
+def three_modes():
+    """Transitions are named after the modes that they join; each has its place as a parameter."""
+    names = ("ab", "ac", "bc", "ca")
+    return HybridSystem(
+        state=("q",),
+        parameters=dict.fromkeys(names, AHEAD),
+        modes=[Mode(mode, lambda t, x, p: (1.0,)) for mode in "abc"],
+        transitions=[Transition(name[0], name[1], rising(name), name=name) for name in names],
+    )
 
-    return chosen
+
+def begun(places, mode=None):
+    return simulate(three_modes(), (0.0,), (0.0, 0.5), mode=mode, parameters=places)
 
 
 @pytest.mark.parametrize(
-    ("verdicts", "mode", "expected"),
+    ("places", "mode", "expected"),
     [
         # A named mode is entered wherever its guards are; those of other modes do not count.
-        ({"ab": BEYOND, "ac": LEAVES, "bc": BEYOND}, "a", (0, ("ab",))),
-        ({"ab": BEYOND, "ac": BEYOND}, "b", (1, ())),
-        ({"ab": LEAVES, "bc": BEYOND}, "b", (1, ("bc",))),
-        ({"ab": BEYOND, "bc": math.nan}, "a", (0, ("ab",))),
-        ({"ca": BEYOND, "ab": math.nan}, "c", (2, ("ca",))),
+        ({"ab": BEYOND, "ac": AHEAD, "bc": BEYOND}, "a", "a"),
+        ({"ab": BEYOND, "ac": BEYOND}, "b", "b"),
+        ({"ca": BEYOND, "ab": UNDEFINED}, "c", "c"),
         # Without a name, the only mode that no guard objects to.
-        ({"ab": BEYOND, "bc": LEAVES}, None, (2, ())),
-        ({"ac": LEAVES, "ca": BEYOND}, None, (1, ())),
+        ({"ab": BEYOND, "bc": LEAVES}, None, "c"),
+        ({"ac": LEAVES, "ca": BEYOND}, None, "b"),
         # A guard without a value objects to its mode alone.
-        ({"ab": math.nan, "ca": BEYOND}, None, (1, ())),
+        ({"ab": UNDEFINED, "ca": BEYOND}, None, "b"),
     ],
 )
-def test_the_mode_that_allows_the_start(choose, verdicts, mode, expected):
-    assert choose(verdicts, mode) == expected
-
-
-def test_the_only_mode_of_a_system_needs_no_name(choose):
-    own = {"hit": ("m", "hit")}
-    assert choose({"hit": LEAVES}, out=own, modes=("m",)) == (0, ())
-    assert choose({"hit": BEYOND}, out=own, modes=("m",)) == (0, ("hit",))
-    with pytest.raises(ArgumentError, match=r"'hit': the guard is nan at t = 0.5, x0 = \(1.0, 2.0\)"):
-        choose({"hit": math.nan}, out=own, modes=("m",))
+def test_the_mode_that_allows_the_start(places, mode, expected):
+    arc = begun(places, mode)
+    assert arc.mode[0] == expected
+    beyond = [name for name, place in places.items() if place == BEYOND and name[0] == expected]
+    assert ("The start lies beyond the guard of" in arc.status.message) == bool(beyond)
+    assert all(repr(name) in arc.status.message for name in beyond)
 
 
 @pytest.mark.parametrize(
-    ("verdicts", "mode", "text"),
+    ("places", "mode", "text"),
     [
-        ({"ab": BEYOND}, None, r"x0 = \(1.0, 2.0\) is allowed in more than one mode: b, c. Choose"),
+        ({"ab": BEYOND}, None, r"x0 = \(0.0,\) is allowed in more than one mode: b, c. Choose"),
         ({}, None, "in more than one mode: a, b, c"),
         (
             {"ab": BEYOND, "ac": LEAVES, "bc": BEYOND, "ca": LEAVES},
@@ -88,41 +68,13 @@ def test_the_only_mode_of_a_system_needs_no_name(choose):
             "no mode: mode 'a' is left through 'ab', 'ac'; mode 'b' is left through 'bc'; mode 'c' is left",
         ),
         # The first of the guards without a value, where no mode is left.
-        ({"ab": BEYOND, "ca": math.nan, "bc": math.nan}, None, "'bc': the guard is nan"),
-        ({"ac": math.nan}, "a", "'ac': the guard is nan"),
+        ({"ab": BEYOND, "ca": UNDEFINED, "bc": UNDEFINED}, None, "'bc': the guard is nan"),
+        ({"ac": UNDEFINED}, "a", r"'ac': the guard is nan at t = 0.0, x0 = \(0.0,\)"),
     ],
 )
-def test_a_start_that_no_mode_or_several_allow_is_refused(choose, verdicts, mode, text):
+def test_a_start_that_no_mode_or_several_allow_is_refused(places, mode, text):
     with pytest.raises(ArgumentError, match=text):
-        choose(verdicts, mode)
-
-
-@pytest.mark.parametrize(
-    ("verdicts", "expected"),
-    [
-        # Sides must be right; guards of the user's may be crossed in a mode that is named.
-        ({"up": BEYOND}, (1, ())),
-        ({"down": BEYOND}, (0, ())),
-        ({"up": LEAVES, "hit": BEYOND}, (1, ("hit",))),
-    ],
-)
-def test_of_the_parts_of_a_named_mode_the_one_on_the_side_of_the_state(choose, verdicts, expected):
-    assert choose(verdicts, "m", SPLIT, ("m, q<0", "m, q>0", "c")) == expected
-
-
-@pytest.mark.parametrize(("verdicts", "names"), [({}, "m, q<0, m, q>0"), ({"hit": BEYOND}, "m, q<0, m, q>0")])
-def test_parts_that_both_allow_the_state_are_told(choose, verdicts, names):
-    with pytest.raises(ArgumentError, match=f"more than one mode: {names}. Choose"):
-        choose(verdicts, "m", SPLIT, ("m, q<0", "m, q>0", "c"))
-
-
-@pytest.mark.parametrize(("onward", "made"), [({"up", "down"}, ["down"]), ({"up"}, ["up"])])
-def test_where_no_part_allows_the_state_a_mode_along_the_last_surface_is_made(choose, onward, made):
-    found = []
-    growth = SimpleNamespace(leads_on=onward.__contains__, extend=found.append)
-    with pytest.raises(Unexplored, match=made[0]):
-        choose({"up": BEYOND, "down": BEYOND}, "m", SPLIT, ("m, q<0", "m, q>0", "c"), growth)
-    assert found == made
+        begun(places, mode)
 
 
 def sides(left, right, reset=None):

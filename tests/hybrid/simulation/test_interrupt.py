@@ -6,7 +6,6 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ import hybrid
 import lyapunov
 import models
 from hybrid import StatusCode
-from hybrid.kernels.types import codes
 from hybrid.simulation import interrupt
 from hybrid.simulation.interrupt import CTRL_C, CtrlC
 from lyapunov.two_orbit import INTERVALS_AT_ONCE
@@ -271,76 +269,9 @@ def test_the_limit_of_steps_holds_across_bursts():
     assert found.status.code == StatusCode.MAX_STEPS
 
 
-@pytest.mark.parametrize("code", [codes.DONE, codes.MAX_STEPS])
-def test_bursts_grow_only_if_they_use_up_their_steps(code):
-    """A kernel that returns early for another reason says nothing about the time of a step."""
-    run = SimpleNamespace(stop=threading.Event(), max_steps=10**12, steps=0)
-    bursts = interrupt.Bursts([run])
-    for _ in range(70):
-        bursts.most()
-        bursts.judged(code)
-    assert (bursts.steps == interrupt.FIRST_BURST) == (code == codes.DONE)
-
-
-@pytest.mark.parametrize("steps", [(10, 4), (4, 10), (10, 10)])
-def test_one_of_several_runs_at_its_limit_of_steps_ends_them_all(steps):
-    runs = [SimpleNamespace(stop=threading.Event(), max_steps=10, steps=each) for each in steps]
-    assert interrupt.Bursts(runs).judged(codes.MAX_STEPS) == codes.MAX_STEPS
-
-
 def test_many_short_calls_of_a_kernel():
     """Two orbits of so many intervals are followed in more calls than an integer has digits."""
     found = lyapunov.two_orbit_exponents(
         models.bouncing_ball(), (1.0, 0.0), intervals=70 * INTERVALS_AT_ONCE, interval=1e-7
     )
     assert found.intervals == 70 * INTERVALS_AT_ONCE
-
-
-class TestBursts:
-    """Steps that take 1 ms each, of which 20 ms are wanted before each question."""
-
-    def made(self, monkeypatch, limit=10**9, asked=False):
-        clock = [100.0]
-        monkeypatch.setattr(interrupt, "perf_counter", lambda: clock[0])
-        run = SimpleNamespace(steps=7, max_steps=limit, stop=SimpleNamespace(is_set=lambda: asked))
-        return interrupt.Bursts([run]), run, clock
-
-    def burst(self, bursts, run, clock, seconds, code=codes.MAX_STEPS):
-        run.steps = min(bursts.most(), run.steps + bursts.steps)
-        clock[0] += seconds
-        return bursts.judged(code)
-
-    def test_short_ones_are_doubled(self, monkeypatch):
-        bursts, run, clock = self.made(monkeypatch)
-        for times in range(1, 4):
-            assert self.burst(bursts, run, clock, 0.5 * interrupt.SECONDS) == codes.GO_ON
-            assert bursts.steps == interrupt.FIRST_BURST * 2**times
-
-    def test_long_ones_are_cut_to_what_fits(self, monkeypatch):
-        bursts, run, clock = self.made(monkeypatch)
-        before = bursts.steps
-        assert self.burst(bursts, run, clock, 1.5 * interrupt.SECONDS) == codes.GO_ON
-        assert bursts.steps == before
-        assert self.burst(bursts, run, clock, 4.0 * interrupt.SECONDS) == codes.GO_ON
-        assert bursts.steps == before // 4
-        assert self.burst(bursts, run, clock, 1e9) == codes.GO_ON
-        assert bursts.steps == 1
-
-    def test_work_that_is_done_early_tells_nothing(self, monkeypatch):
-        bursts, run, clock = self.made(monkeypatch)
-        before = bursts.steps
-        assert self.burst(bursts, run, clock, 0.0, codes.DONE) == codes.DONE
-        assert bursts.steps == before
-
-    def test_the_limit_of_steps_ends_a_run(self, monkeypatch):
-        bursts, run, _ = self.made(monkeypatch, limit=100)
-        run.steps = 95
-        assert bursts.most() == 100
-        run.steps = 100
-        assert bursts.judged(codes.MAX_STEPS) == codes.MAX_STEPS
-
-    def test_a_stop_is_heard_when_a_burst_or_a_run_is_over(self, monkeypatch):
-        bursts, run, clock = self.made(monkeypatch, asked=True)
-        assert self.burst(bursts, run, clock, 0.0) == StatusCode.INTERRUPTED
-        assert self.burst(bursts, run, clock, 0.0, codes.DONE) == StatusCode.INTERRUPTED
-        assert self.burst(bursts, run, clock, 0.0, codes.STUCK) == codes.STUCK

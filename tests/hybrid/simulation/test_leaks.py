@@ -15,7 +15,7 @@ from hybrid.testing import variants
 
 def test_systems_go_when_nobody_holds_them():
     held = []
-    for i in range(200):
+    for i in range(40):
         system = models.bouncing_ball()
         arc = hybrid.simulate(system, (1.0, 0.0), (0.0, 1.0), tangent=i % 2 == 0, parameters={"e": 0.5})
         held += [weakref.ref(system), weakref.ref(hybrid.compile_system(system)), weakref.ref(arc)]

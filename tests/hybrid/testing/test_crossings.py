@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hybrid.testing import PropertyError, crossings
-from hybrid.testing.crossings import _check_between, _check_doubled, check_crossings
+from hybrid.testing import PropertyError
+from hybrid.testing.crossings import _check_between, _check_doubled
 
 TIMES = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
 
@@ -43,32 +43,6 @@ def test_a_change_of_sign_counts_in_the_direction_of_the_guard(values, rising, f
     for direction, expected in ((1, rising), (-1, falling), (0, either)):
         told = None if expected is None else f"t = {expected[0]} and t = {expected[1]}"
         assert missed(values, direction) == told
-
-
-@pytest.mark.parametrize("conditional", [False, True])
-def test_guards_without_a_condition_are_examined_in_their_mode(conditional, monkeypatch):
-    """From 2 to 4 in mode ``a``, then to 12 in mode ``b``; at 63 places inside of each stretch."""
-    guards = [
-        SimpleNamespace(name=name, source=source, guard=SimpleNamespace(when=when))
-        for name, source, when in (("one", "a", None), ("two", "b", None), ("three", "a", "sometimes"))
-    ]
-    examined, discarded = [], []
-
-    def check(case, transition, places, states):
-        assert len(places) == 63
-        assert np.array_equal(states, -places)
-        examined.append((transition.name, places[0], places[-1]))
-
-    monkeypatch.setattr(crossings, "as_case", lambda case: case)
-    monkeypatch.setattr(crossings, "discard", discarded.append)
-    monkeypatch.setattr(crossings, "_check_doubled", lambda case: examined.append("doubled"))
-    monkeypatch.setattr(crossings, "stretches", lambda case: [(0, "a", 2.0, 2.0), (1, "b", 4.0, 8.0)])
-    monkeypatch.setattr(crossings, "_check_between", check)
-    system = SimpleNamespace(transitions=guards[2:] if conditional else guards)
-    check_crossings(SimpleNamespace(system=system, run=SimpleNamespace(arc=lambda t: -t)))
-    wanted = [] if conditional else [("one", 2 + 2 / 64, 4 - 2 / 64), ("two", 4 + 8 / 64, 12 - 8 / 64)]
-    assert examined == ["doubled", *wanted]
-    assert discarded == (["every guard has a condition"] if conditional else [])
 
 
 @pytest.mark.parametrize(

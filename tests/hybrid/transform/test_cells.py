@@ -28,42 +28,6 @@ def numbers(pieces):
     return [heights.index(symbol) for symbol in pieces.surfaces.symbols.x[:2]]
 
 
-class TestParallel:
-    """Steps of 1, 10 and 100 at ``x = 0, 1, 2``: on each surface the sides of the others follow."""
-
-    @staticmethod
-    def field(t, x, p):
-        return sum(10.0**k * np.where(x.x > k, 1.0, -1.0) for k in range(3)), x.y
-
-    def test_each_cell_has_the_sides_that_do_not_follow(self):
-        pieces, cells = pieces_of(self.field)
-        assert len(pieces.surfaces.known) == 3
-        fields = {}
-        for cell in cells:
-            fields[cell.sides] = value(pieces, pieces.flow(dict(cell.branches)), (0.5, 2.0)).tolist()
-        assert sorted(fields.values()) == [[-111.0, 2.0], [-109.0, 2.0], [-89.0, 2.0], [111.0, 2.0]]
-        assert sorted(map(len, fields)) == [1, 1, 2, 2]
-
-    @pytest.mark.parametrize("at", [0, 1, 2])
-    def test_fields_on_both_sides_of_a_surface(self, at):
-        """Only the branch of the surface itself differs; sides of the others are implied, or given too."""
-        pieces, _ = pieces_of(self.field)
-        [number] = [
-            k
-            for k, known in enumerate(pieces.surfaces.known)
-            if value(pieces, scalar(known.height), (float(at), 0.0))[0] == 0.0
-        ]
-        others = sum(10.0**k * np.sign(at - k) for k in range(3))
-        surface = pieces.between({number: -1}, number)
-        assert value(pieces, surface.below, (at, 3.0)).tolist() == [others - 10.0**at, 3.0]
-        assert value(pieces, surface.above, (at, 3.0)).tolist() == [others + 10.0**at, 3.0]
-        assert pieces.between({number: 1}, number) is surface
-        assert pieces.jumps({}, number)
-        assert pieces.may_attract({}, number)
-        [change] = pieces.changes({}, number)
-        assert [float(each) for each in change] == [2.0 * 10.0**at, 0.0]
-
-
 def test_a_kink_is_no_jump_and_a_jump_along_the_surface_does_not_attract():
     def field(t, x, p):
         return 1.0 - x.y, np.sign(x.x) + np.maximum(x.y, 0.0)

@@ -1,6 +1,5 @@
 """An autonomous run does not depend on its start time; the clock of a run loses no digits."""
 
-import math
 from fractions import Fraction
 
 import numpy as np
@@ -13,8 +12,6 @@ import hybrid
 import models
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 from hybrid.kernels.arithmetic import clock
-from hybrid.kernels.types.kinds import INDICES, VECTOR
-from hybrid.kernels.types.structure import Structure
 
 SHIFTS = [2.0**20, -(2.0**20), 2.0**30]
 SOLVERS = [hybrid.Taylor(), hybrid.DOP853(), hybrid.RadauIIA()]
@@ -119,50 +116,9 @@ def test_forcing_without_a_period_is_limited_by_the_rounding_of_time():
     assert hybrid.simulate(periodic, (-70.6, 0.0), (1e9, 1e9 + 100.0)).status.ok
 
 
-_sum, _left, _forward, _set = clock.sum_in_two_parts, clock.time_left, clock.forward, clock.set_clock
-_measured = clock.measured_time
-
-
-class Clock(Structure, counters=("cycle",), numbers=("phase", "phase_low", "since_entry", "period")):
-    """The parts of a run and of a model that the clock needs."""
-
-    counters: INDICES
-    numbers: VECTOR
-    timed: INDICES
-
-
-def clock(period, phase=0.0, timed=0):
-    return Clock(
-        counters=np.zeros(1, dtype=np.int64),
-        numbers=np.array([phase, 0.0, 0.25, period]),
-        timed=np.array([timed]),
-    )
-
-
 @njit
 def sum_in_two_parts(a, b):
-    return _sum(a, b)
-
-
-@njit
-def forward_all(run, period, spans):
-    for span in spans:
-        _forward(run, period, span)
-
-
-@njit
-def time_left(run, cycle, phase):
-    return _left(run, run, cycle, phase)
-
-
-@njit
-def set_clock(run, cycle, phase):
-    _set(run, cycle, phase)
-
-
-def exact(run):
-    """The time that a clock shows."""
-    return run.cycle * Fraction(run.numbers[3]) + Fraction(run.phase) + Fraction(run.phase_low)
+    return clock.sum_in_two_parts(a, b)
 
 
 @given(st.floats(-1e6, 1e6), st.floats(-1e6, 1e6))
@@ -170,37 +126,3 @@ def test_a_sum_in_two_parts_is_exact(a, b):
     total, lost = sum_in_two_parts(a, b)
     assert total == a + b
     assert Fraction(total) + Fraction(lost) == Fraction(a) + Fraction(b)
-
-
-@pytest.mark.parametrize("period", [0.0, 0.3, 2 * np.pi, 1e6])
-@pytest.mark.parametrize("longest", [1e-3, 0.3, 5.0])
-def test_the_clock_adds_up_without_rounding(period, longest):
-    spans = np.random.default_rng(0).uniform(0.0, longest, 4000)
-    run = clock(period, 0.1)
-    forward_all(run, period, spans)
-    expected = Fraction(0.1) + sum(map(Fraction, spans))
-    # Four thousand sums in twice the digits.
-    assert abs(exact(run) - expected) < 1e-24 * float(expected) * len(spans)
-    assert period == 0.0 or 0.0 <= run.phase < period
-    left = time_left(run, run.cycle + 2, run.phase + 1e-9)
-    expected = (
-        2 * Fraction(period) + Fraction(run.phase + 1e-9) - Fraction(run.phase) - Fraction(run.phase_low)
-    )
-    assert left == pytest.approx(float(expected), rel=4e-16, abs=1e-24)
-    assert time_left(run, 0, math.inf) == math.inf
-
-
-def test_a_clock_that_is_set_shows_just_that():
-    run = clock(1.0, 0.1)
-    forward_all(run, 1.0, np.array([0.7, 0.7]))
-    set_clock(run, 12, 0.3)
-    assert (run.cycle, run.phase, run.phase_low) == (12, 0.3, 0.0)
-
-
-def test_only_a_mode_that_depends_on_time_rounds_with_its_phase():
-    @njit
-    def measured(run):
-        return _measured(run, run, 0)
-
-    assert measured(clock(0.0, -3.0, timed=0)) == 0.25
-    assert measured(clock(0.0, -3.0, timed=1)) == 3.0

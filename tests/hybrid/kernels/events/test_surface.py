@@ -1,7 +1,6 @@
 """Saltation matrices of guards whose gradient does not show their surface: flat, vertical, jumping ones."""
 
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,9 +17,7 @@ from hybrid import (
     saltation_matrix,
     simulate,
 )
-from hybrid.kernels.events import surface
 from lyapunov import lyapunov_spectrum
-from tests.hybrid.kernels.plain import plain
 
 SOLVERS = {"Taylor": Taylor(), "DOP853": DOP853(), "RadauIIA": RadauIIA()}
 
@@ -140,116 +137,3 @@ def test_a_dip_of_a_guard_that_is_not_affine_still_grazes(depth, solver):
     arc = simulate(system, (1.0 - depth, -2.0), (0.0, 1.5), tangent=True, solver=SOLVERS[solver])
     assert {jump.kind for jump in arc.jumps} <= {"grazing"}
     assert len(arc.jumps) + len(arc.grazings) == 1
-
-
-class TestKernels:
-    """A guard ``g(t, x)`` of two components on the path ``x + s f`` with ``f = (2, -1)`` from ``(1, 3)``."""
-
-    X, FIELD = np.array([1.0, 3.0]), np.array([2.0, -1.0])
-
-    def setup_of(self, guard, gradient=lambda t, x: (0.0, 0.0, 0.0)):
-        def write_guard(transition, t, x, parameters, out):
-            out[0] = guard(t, x)
-
-        def write_gradient(transition, t, x, parameters, out):
-            with np.errstate(all="ignore"):
-                out[:] = gradient(t, x)
-
-        model = SimpleNamespace(
-            dimension=2,
-            parameters=None,
-            affine_guard=np.array([1, 0]),
-            guard=write_guard,
-            guard_gradient=write_gradient,
-        )
-        work = SimpleNamespace(
-            field=self.FIELD,
-            state=np.zeros(2),
-            scalar=np.zeros(1),
-            gradient=np.full(3, 9.0),
-            stages=np.zeros((2, 3)),
-        )
-        return model, work
-
-    def test_the_guard_on_parallels(self):
-        model, work = self.setup_of(lambda t, x: 100 * t + 10 * x[0] + x[1])
-        found = plain(surface).value_on_parallel(model, 1, 5.0, self.X, 0.5, 1, 0.25, work)
-        assert found == 550.0 + 20.0 + 2.75
-
-    def test_noise_is_that_of_rounding(self):
-        model, work = self.setup_of(lambda t, x: x[0] - x[1])
-        value, noise = plain(surface).value_and_noise(model, 1, 0.0, self.X, 0.5, work)
-        assert value == -0.5
-        assert noise == pytest.approx(surface.ROUNDING * 4.5, rel=0.1)
-
-    def test_the_unit_of_time(self):
-        for field, x, unit in (
-            ((2.0, -1.0), (1.0, 3.0), 1.5),
-            ((2.0, 0.0), (1.0, 3.0), 0.5),
-            ((0.0, 0.0), (1.0, 3.0), 1.0),
-            ((2.0, -1.0), (0.0, 0.0), 1.0),
-        ):
-            work = SimpleNamespace(field=np.array(field))
-            assert plain(surface).unit_of_time(SimpleNamespace(dimension=2), np.array(x), work) == unit
-
-    @pytest.mark.parametrize("rises", [1.0, -1.0])
-    def test_a_jump_on_a_parallel(self, rises):
-        """``x_0 - 3 x_1 / 2 + 7 / 2`` is zero at the start of the path, with the speed 7/2."""
-        model, work = self.setup_of(lambda t, x: rises * np.sign(x[0] - 1.5 * x[1] + 3.5))
-        tested = plain(surface)
-        for i, shift, wanted in ((0, 0.01, -0.01 / 3.5), (0, -0.01, 0.01 / 3.5), (1, 0.02, 0.03 / 3.5)):
-            found = tested.time_of_jump(model, 1, 0.0, self.X, (i, shift), (1e-7, 0.1), rises, work)
-            assert found == pytest.approx(wanted, rel=1e-9)
-        assert np.isnan(tested.time_of_jump(model, 1, 0.0, self.X, (0, 1.0), (1e-7, 0.1), rises, work))
-        assert np.isnan(tested.time_of_jump(model, 1, 0.0, self.X, (0, 0.01), (1e-7, 0.1), -rises, work))
-
-    @pytest.mark.parametrize("rises", [1.0, -1.0])
-    def test_the_plane_of_a_jump(self, rises):
-        model, work = self.setup_of(lambda t, x: rises * np.sign(t + x[0] - 1.5 * x[1] + 3.5))
-        assert plain(surface).plane_of_jump(model, 1, 0.0, self.X, 1.5, 1e-7, rises, work)
-        np.testing.assert_allclose(work.gradient, np.array([1.0, -1.5, 1.0]) / 4.5, rtol=1e-9)
-
-    def test_a_plane_beside(self):
-        """Of the cube of the same; a corner of the surface has none."""
-        edge = np.array([1.0, -1.5, 1.0])
-
-        def cube(t, x):
-            return 3 * (t + x[0] - 1.5 * x[1] + 3.5) ** 2 * edge
-
-        model, work = self.setup_of(None, cube)
-        assert plain(surface).plane_beside(model, 1, 0.0, self.X, 1.5, 1e-7, work)
-        np.testing.assert_allclose(work.gradient, edge / 4.5, rtol=1e-12)
-
-        def corner(t, x):
-            return edge * (1.0, 1.0 if t > 0 else 1.01, 1.0)
-
-        model, work = self.setup_of(None, corner)
-        assert not plain(surface).plane_beside(model, 1, 0.0, self.X, 1.5, 1e-7, work)
-        model, work = self.setup_of(None, lambda t, x: (0.0, 0.0, 0.0))
-        with np.errstate(invalid="ignore"):
-            assert not plain(surface).plane_beside(model, 1, 0.0, self.X, 1.5, 1e-7, work)
-
-    @pytest.mark.parametrize(
-        ("guard", "explained", "turn"),
-        [
-            (lambda e: np.sign(e), 1e-9, 1),
-            (lambda e: -np.sign(e), 1e-9, -1),
-            (lambda e: np.sign(e) + 2.0, 1e-9, 0),
-            (lambda e: np.sign(e), 0.01, 0),
-            (lambda e: e, 0.0, 0),
-            (lambda e: np.cbrt(e), 0.0, 0),
-            (lambda e: np.tanh(1e12 * e), 0.0, 1),
-        ],
-    )
-    def test_whether_it_jumps(self, guard, explained, turn):
-        model, work = self.setup_of(lambda t, x: guard(x[0] - 1.0))
-        assert plain(surface).jumps_across(model, 1, 0.0, self.X, 1e-7, explained, work) == turn
-
-    def test_an_affine_guard_and_a_smooth_one_show_it_themselves(self):
-        model, work = self.setup_of(
-            lambda t, x: np.expm1(x[0] - 1.0), lambda t, x: (np.exp(x[0] - 1.0), 0.0, 0.0)
-        )
-        assert not plain(surface).finds_surface(model, 0, 0.0, self.X, 2.0, work)
-        assert work.gradient.tolist() == [9.0, 9.0, 9.0]
-        assert not plain(surface).finds_surface(model, 1, 0.0, self.X, 2.0, work)
-        assert work.gradient.tolist() == [1.0, 0.0, 0.0]

@@ -4,12 +4,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numba import njit
 from scipy.linalg import expm
 
 from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Taylor, Transition, simulate
-from hybrid.kernels.jumps import jump
-from hybrid.simulation.trajectory import start
 from lyapunov import lyapunov_spectrum
 
 SOLVERS = pytest.mark.parametrize(
@@ -264,42 +261,3 @@ def test_the_sum_rule_counts_the_divergence_with_any_number_of_vectors(solver, k
         system, (1.0, 0.0, 0.5), k=k, interval=4.0, intervals=5, transient=4, solver=solver
     )
     assert spectrum.sum_rule == pytest.approx(-0.2 - np.log(2.0), abs=1e-9)
-
-
-_saltation = jump.saltation
-
-
-@njit
-def saltation(model, transition, t, x_minus, x_plus, work):
-    return _saltation(model, transition, t, x_minus, x_plus, work)
-
-
-@pytest.mark.parametrize("unit", [1.0, 2.0**40])
-def test_the_sizes_of_the_terms_of_a_saltation_matrix(unit):
-    """Sums of magnitudes of the terms of each entry, in any unit of the guard."""
-    system = HybridSystem(
-        state=("x", "y"),
-        parameters={"unit": 1.0},
-        modes=[Mode("a", lambda t, x, p: (x.y, -2.0 * x.x)), Mode("b", lambda t, x, p: (-1.0, x.x * x.y))],
-        transitions=[
-            Transition(
-                "a", "b", Guard(lambda t, x, p: p.unit * (3.0 * x.x - x.y * x.y + 0.5 * t), +1),
-                Reset(lambda t, x, p: (0.5 * x.x - x.y, 2.0 * x.x + x.y + 3.0 * t)),
-            )
-        ],
-    )  # fmt: skip
-    run = start(system, (-4.0, 0.7), 0.2, mode="a", parameters={"unit": unit}, tangent=np.eye(2))
-    t, (x, y), x_plus = 0.2, (0.3, 0.7), np.zeros(2)
-    transversality = saltation(run.model, 0, t, np.array([x, y]), x_plus, run.work)
-    f, g, g_t = np.array([y, -2.0 * x]), np.array([3.0, -2.0 * y]), 0.5
-    matrix, rate = np.array([[0.5, -1.0], [2.0, 1.0]]), np.array([0.0, 3.0])
-    np.testing.assert_allclose(x_plus, matrix @ (x, y) + rate * t, rtol=1e-15)
-    after = np.array([-1.0, x_plus[0] * x_plus[1]])
-    speed = g @ f + g_t
-    assert transversality == pytest.approx(unit * speed, rel=1e-14)
-    expected = matrix + np.outer(after - matrix @ f - rate, g) / speed
-    np.testing.assert_allclose(run.work.saltation, expected, rtol=1e-13)
-    terms = np.abs(after) + np.abs(rate) + np.abs(matrix) @ np.abs(f)
-    np.testing.assert_allclose(
-        run.work.sizes, np.abs(matrix) + np.outer(terms, np.abs(g)) / abs(speed), rtol=1e-13
-    )

@@ -1,20 +1,17 @@
 """Locked jumps: a reset lands beyond their guards, so they fire at the time of the first guard."""
 
 from functools import cache, reduce
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import hybrid
 from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Taylor, Transition, simulate
-from hybrid.kernels.jumps import locked
 from hybrid.simulation.memory import empty_record
 from hybrid.simulation.trajectory import start
 from hybrid.testing.case import Case
 from hybrid.testing.saltation import check_saltation, check_sum_rule
 from lyapunov import lyapunov_spectrum
-from tests.hybrid.kernels.plain import plain
 
 SOLVERS = (Taylor(), DOP853(rtol=1e-12, atol=1e-14))
 
@@ -227,97 +224,3 @@ def test_properties():
         case = Case(system, dict(system.parameters), mode, x0, 0.0, t1)
         check_saltation(case)
         check_sum_rule(case)
-
-
-class TestMapOfAnInstant:
-    """Three states and two tangent vectors, with the kernels as plain Python."""
-
-    N, TANGENTS = 3, 2
-
-    @pytest.fixture
-    def kernels(self):
-        return plain(locked)
-
-    @pytest.fixture
-    def run(self):
-        n, k = self.N, self.TANGENTS
-        return SimpleNamespace(
-            y=np.arange(1.0, 1.0 + n * (1 + k)),
-            before=np.zeros(n * k),
-            growth=np.array([0.25, 0.5]),
-            growth_before=np.zeros(k),
-            log_determinant=3.0,
-            log_determinant_before=0.0,
-            ill_conditioned_growth=7,
-            ill_conditioned_growth_before=0,
-            instant=np.full(n * (1 + n), 9.0),
-            map_is_known=5,
-        )
-
-    def map_in(self, kernels, run):
-        out = np.zeros((self.N, self.N))
-        kernels.map_of_instant(run, self.N, out)
-        return out
-
-    def test_tangent_vectors_are_restored_with_their_sums(self, kernels, run):
-        kernels.keep_tangents(run, self.N, self.TANGENTS)
-        kept = run.y.copy()
-        run.y[:] = -1.0
-        run.growth[:] = -1.0
-        run.log_determinant, run.ill_conditioned_growth = -1.0, -1
-        kernels.restore_tangents(run, self.N, self.TANGENTS)
-        np.testing.assert_array_equal(run.y, [-1.0, -1.0, -1.0, *kept[3:]])
-        assert run.growth.tolist() == [0.25, 0.5]
-        assert (run.log_determinant, run.ill_conditioned_growth) == (3.0, 7)
-
-    def test_the_instant_changes_with_the_state(self, kernels, run):
-        """The speed of the guard is ``8 - 2 * 7 + 2 = -4``."""
-        work = SimpleNamespace(gradient=np.array([2.0, 0.0, -1.0, 8.0]), field=np.array([-7.0, 3.0, -2.0]))
-        kernels.change_of_instant(run, self.N, work)
-        assert run.instant[:3].tolist() == [0.5, 0.0, -0.25]
-        assert run.instant[3] == 9.0
-        # What the guard does not feel stays zero at a speed of zero, too.
-        at_rest = SimpleNamespace(gradient=np.zeros(4), field=np.ones(3))
-        kernels.change_of_instant(run, self.N, at_rest)
-        assert run.instant[:3].tolist() == [0.0, 0.0, 0.0]
-
-    def test_a_map_that_is_stored(self, kernels, run):
-        matrix = np.arange(9.0).reshape(3, 3) ** 2
-        kernels.begin_instant(run, self.N, self.TANGENTS, SimpleNamespace(saltation=matrix))
-        assert run.map_is_known == 1
-        np.testing.assert_array_equal(run.before, run.y[3:])
-        np.testing.assert_array_equal(self.map_in(kernels, run), matrix)
-        assert run.instant[:3].tolist() == [9.0, 9.0, 9.0]
-        kernels.postpone_map(run, self.N)
-        assert run.map_is_known == 0
-        np.testing.assert_array_equal(run.instant[:3], run.y[:3])
-
-    def test_at_a_start_the_map_is_the_identity_and_the_instant_is_given(self, kernels, run):
-        kernels.begin_at_start(run, self.N, self.TANGENTS)
-        assert run.map_is_known == 1
-        np.testing.assert_array_equal(run.before, run.y[3:])
-        np.testing.assert_array_equal(self.map_in(kernels, run), np.eye(3))
-        assert run.instant[:3].tolist() == [0.0, 0.0, 0.0]
-
-    @pytest.mark.parametrize("kicks", [np.array([0.5, 0.0, -2.0]), np.zeros(3)])
-    def test_a_locked_jump(self, kernels, run, kicks):
-        """The new map is ``D_x R P - kick a``; its own matrix takes the old map to the new one."""
-        rng = np.random.default_rng(2)
-        first, reset, change = rng.normal(size=(3, 3)), rng.normal(size=(3, 4)), rng.normal(size=3)
-        work = SimpleNamespace(
-            saltation=first,
-            reset_jacobian=reset,
-            settled=kicks,
-            jacobian=np.zeros((3, 4)),
-            error=np.zeros(9),
-            state=np.zeros(3),
-            rounding=np.zeros((4, 3)),
-        )
-        kernels.keep_map(run, self.N, work)
-        run.instant[:3] = change
-        work.saltation = np.zeros((3, 3))
-        kernels.follow(run, self.N, work)
-        new = reset[:, :3] @ first - np.outer(kicks, change)
-        np.testing.assert_allclose(self.map_in(kernels, run), new, rtol=1e-13)
-        np.testing.assert_allclose(work.saltation @ first, new, rtol=1e-12)
-        np.testing.assert_array_equal(run.instant[:3], change)

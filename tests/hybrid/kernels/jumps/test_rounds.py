@@ -6,12 +6,8 @@ from functools import cache
 import attrs
 import numpy as np
 import pytest
-from numba import njit
 
 from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, StatusCode, Taylor, Transition, simulate
-from hybrid.kernels.jumps import rounds
-from hybrid.kernels.types.kinds import INDICES, INTEGER, MATRIX, VECTOR
-from hybrid.kernels.types.structure import Structure
 
 SOLVERS = (Taylor(), DOP853(rtol=1e-12, atol=1e-14))
 FALL = math.sqrt(2 / 9.81)
@@ -236,131 +232,6 @@ def spiral():
             )
         ],
     )
-
-
-_left, _turn, _extrapolate = rounds.time_left_of_rounds, rounds.transitions_in_turn, rounds.extrapolate
-_by_rounds, _remember = rounds.extrapolate_by_rounds, rounds.remember_visit
-SLOTS = 64
-
-
-class Past(Structure, counters=("jumps", "chattering", "cycle"), numbers=("phase", "period")):
-    """The parts of a run and of a model that tell of past jumps."""
-
-    counters: INDICES
-    numbers: VECTOR
-    dimension: INTEGER
-    recent: INDICES
-    visits: MATRIX
-    y: VECTOR
-
-
-@njit
-def _remember_all(past, names, times, states, period):
-    for j in range(len(names)):
-        past.recent[past.jumps & 63] = names[j]
-        past.jumps += 1
-        past.cycle = int(np.floor(times[j] / period)) if period > 0.0 else 0
-        past.phase = times[j] - past.cycle * period
-        past.y[:] = states[j]
-        _remember(past, past)
-
-
-@njit
-def _time_left(past, turn, back):
-    return _left(past, past, turn, back)
-
-
-@njit
-def _in_turn(past):
-    return _turn(past, past)
-
-
-@njit
-def _limit(past, turn, back, left, out):
-    _extrapolate(past, past, turn, back, left, out)
-
-
-@njit
-def _limit_by_rounds(past, turn, back, out):
-    _by_rounds(past, past, turn, back, out)
-
-
-def past(names, times, states=None, period=0.0):
-    states = np.zeros((len(names), 2)) if states is None else states
-    made = Past(
-        counters=np.zeros(3, dtype=np.int64),
-        numbers=np.array([0.0, period]),
-        dimension=states.shape[1],
-        recent=np.zeros(SLOTS, dtype=np.int64),
-        visits=np.zeros((SLOTS, states.shape[1] + 2)),
-        y=np.zeros(states.shape[1]),
-    )
-    _remember_all(made, np.array(names), np.array(times, dtype=float), states, period)
-    return made
-
-
-def rounds(turn, ratio, count, limit=3.0):
-    """Names and times of ``count`` jumps in rounds of ``turn``, each shorter by ``ratio``, up to a limit."""
-    share = np.linspace(1.0, ratio, turn + 1)[:-1]
-    left = np.array([share[j % turn] * ratio ** (j // turn) for j in range(count)])
-    return np.arange(count) % turn, limit - left
-
-
-@pytest.mark.parametrize("period", [0.0, 0.11])
-@pytest.mark.parametrize("turn", [1, 2, 3, 8])
-@pytest.mark.parametrize("ratio", [0.3, 0.8, 0.95])
-def test_rounds_that_shorten_by_one_ratio_have_a_limit(turn, ratio, period):
-    names, times = rounds(turn, ratio, max(17, 5 * turn + 1))
-    left = (3.0 - times)[:, None]
-    # Smooth in the time that is left.
-    states = np.hstack([0.5 + 2.0 * left - left**2, -1.0 + 0.7 * left])
-    known = past(names, times, states, period)
-    assert _in_turn(known) == turn
-    resolution = 1e-14 / left[-1, 0] / (1.0 - ratio)
-    for back in (0, turn):
-        found, of_rounds = _time_left(known, turn, back)
-        assert found == pytest.approx(left[-1 - back, 0], rel=1e-9 + 10 * resolution)
-        assert of_rounds == pytest.approx(ratio, rel=1e-9 + resolution)
-        out = np.zeros(2)
-        _limit(known, turn, back, left[-1 - back, 0], out)
-        np.testing.assert_allclose(out, [0.5, -1.0], rtol=0, atol=1e-9 + resolution)
-    # Shrinking by a ratio of its own from round to round.
-    slow = (0.9 ** (np.arange(len(names)) // turn))[:, None]
-    known = past(names, times, np.hstack([2.0 + slow, -slow]), period)
-    out = np.zeros(2)
-    _limit_by_rounds(known, turn, 0, out)
-    np.testing.assert_allclose(out, [2.0, 0.0], rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("turn", [1, 2, 4, 8])
-def test_so_many_jumps_must_have_occurred_in_turn(turn):
-    needed = max(16, 5 * turn) + 1
-    for count in range(8, 45):
-        names, times = rounds(turn, 0.7, count)
-        assert _in_turn(past(names, times)) == (turn if count >= needed else 0)
-    names, times = rounds(turn, 0.7, needed)
-    if turn > 1:
-        names[3] = (names[3] + 1) % turn
-        assert _in_turn(past(names, times)) == 0
-    if turn == 1:
-        known = past(names, times)
-        known.chattering = 1
-        assert _in_turn(known) == 0
-
-
-@pytest.mark.parametrize(
-    "durations", [[1.0, 1.0, 1.0], [0.4, 0.5, 0.6], [4.0, 1.0, 0.9], [1.0, 0.9, 0.95], [0.9, 1.0, 0.5]]
-)
-def test_rounds_that_do_not_shorten_steadily_have_none(durations):
-    times = np.cumsum([0.0, *[2.0] * 16, *durations])
-    assert _time_left(past(np.zeros(len(times), dtype=int), times), 1, 0)[0] == 0.0
-
-
-def test_rounds_below_the_rounding_of_time_are_passed_over():
-    _, times = rounds(1, 0.1, 20, limit=1.0)
-    found, ratio = _time_left(past(np.zeros(20, dtype=int), times), 1, 0)
-    assert ratio == pytest.approx(0.1, rel=1e-2)
-    assert 0.0 < found < 1e-17
 
 
 def test_a_limit_across_forcing_periods():

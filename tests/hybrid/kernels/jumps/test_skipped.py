@@ -2,14 +2,11 @@
 
 import math
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, StatusCode, Taylor, Transition, simulate
-from hybrid.kernels.jumps import skipped
-from tests.hybrid.kernels.plain import plain
 
 SOLVERS = {"Taylor": Taylor(), "DOP853": DOP853()}
 METHODS = pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
@@ -180,35 +177,3 @@ class TestAnotherGuardBeforeTheLimit:
         )
         assert arc.x[-1, 3] == 0.0
         assert np.isclose(arc.jumps[-1].t, LIMIT, rtol=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("fired", "turn"),
-    [
-        # From the last jump backwards; ``turn`` reaches back to the first sight of the last unseen one.
-        ([3, 3, 3, 3], 1),
-        ([3, 4, 3, 4], 2),
-        ([3, 3, 4, 3], 3),
-        ([5, 3, 4, 3, 3, 4], 3),
-        ([3, 3, 3, 3, 4], 5),
-        ([3], 1),
-        # More than the memory of eight holds.
-        ([3, 3, 3, 3, 3, 3, 3, 3, 4], 1),
-        ([3, 3, 3, 3, 3, 3, 3, 4, 5], 8),
-    ],
-)
-def test_the_last_jumps_among_which_are_all_transitions(fired, turn):
-    run = SimpleNamespace(jumps=len(fired) + 100, recent=np.zeros(8, dtype=np.int64), visits=np.zeros((8, 1)))
-    recent = [*fired, *[fired[-1]] * 8][:8]
-    for back, transition in enumerate(recent):
-        run.recent[(run.jumps - 1 - back) % 8] = transition
-    assert plain(skipped).jumps_in_turn(run) == turn
-
-
-def test_a_run_that_has_jumped_less_often_than_it_can_remember():
-    """What was never written there is no transition."""
-    run = SimpleNamespace(jumps=3, recent=np.zeros(8, dtype=np.int64), visits=np.zeros((8, 1)))
-    run.recent[:3] = 5
-    assert plain(skipped).jumps_in_turn(run) == 1
-    run.recent[0] = 4
-    assert plain(skipped).jumps_in_turn(run) == 3

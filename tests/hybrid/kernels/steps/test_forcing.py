@@ -1,54 +1,11 @@
 """Pulses far narrower than a step belong to one mode, or come once in each period: none is stepped over."""
 
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Taylor, Transition, Tsit5, simulate
-from hybrid.kernels.events import guards
-from hybrid.kernels.steps import forcing
-from hybrid.kernels.types.codes import ARGUMENTS, IN_TIME, TERMS
-from tests.hybrid.kernels.plain import plain
-
-METHOD = SimpleNamespace(atol=0.5, rtol=0.25, nodes="nodes", b=np.zeros(2))
-
-
-def model_with(*kinds, components=(-1, 1, -1)):
-    """The second of two modes has forcings of these kinds; there are two transitions."""
-    count = len(kinds)
-    return SimpleNamespace(
-        dimension=2,
-        target=np.zeros(2),
-        timed=np.array([0, 1]),
-        first_forcing=np.array([0, 0, count]),
-        forcing_kind=np.array(kinds, dtype=int),
-        forcing_component=np.array(components),
-        programs=SimpleNamespace(first=np.arange(8), checked=np.ones(8, dtype=int)),
-    )
-
-
-def new_run(**values):
-    given = {"mode": 1, "phase": 3.0, "cycle": 2, "y": np.array([7.0, -2.0]), "coarse": 0, "unresolved": 0}
-    given |= {"calm_mode": 0, "calm_cycle": 2, "calm_until": 0.0, "calm_wait": 0, "since_entry": 0.0}
-    return SimpleNamespace(**(given | values))
-
-
-def test_tolerances_of_forcings():
-    """Of the component that a forcing enters; none if that is unknown. The first component counts as well."""
-    model = model_with(IN_TIME, IN_TIME, IN_TIME, components=(-1, 1, 0))
-    found = [plain(forcing)._tolerance(model, METHOD, new_run(), i) for i in range(3)]
-    assert found == [0.0, 0.5 + 0.25 * 2.0, 0.5 + 0.25 * 7.0]
-
-
-@pytest.mark.parametrize(
-    ("kinds", "has"),
-    [((), False), ((IN_TIME,), False), ((ARGUMENTS, TERMS), True), ((IN_TIME, ARGUMENTS), False)],
-)
-def test_modes_with_terms_in_the_state(kinds, has):
-    assert bool(plain(guards).has_terms_in_state(model_with(*kinds), 1)) == has
-
 
 SOLVERS = (Taylor(), DOP853(), RadauIIA(rtol=1e-8, atol=1e-10), Tsit5(rtol=1e-8, atol=1e-10))
 # A lag of one unit of time, that long after a pulse of height 1 and width 0.01: the integral of

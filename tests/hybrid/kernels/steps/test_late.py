@@ -1,7 +1,6 @@
 """Late times are rounded: a run is as good as early, or says that it is not."""
 
 from functools import cache
-from types import SimpleNamespace
 
 import mpmath
 import numpy as np
@@ -19,97 +18,6 @@ from hybrid import (
     Transition,
     simulate,
 )
-from hybrid.kernels.steps import late
-from hybrid.kernels.types.codes import NO_MODE
-from hybrid.kernels.types.layout import EPSILON
-from tests.hybrid.kernels.plain import plain
-
-kernels = plain(late)
-METHOD = SimpleNamespace(rtol=1e-10, atol=1e-12)
-
-
-def test_it_is_late_where_the_rounding_of_time_exceeds_the_tolerance_of_a_step():
-    for phase, span, found in ((4e5, 1.0, False), (5e5, 1.0, True), (-5e5, 1.0, True), (5e5, 1.2, False)):
-        assert kernels.is_late(METHOD, SimpleNamespace(phase=phase, longest_step=span)) == found
-
-
-def test_the_largest_change_is_kept_in_tolerances():
-    run = SimpleNamespace(scale=np.array([0.0, 3.0]), lateness=2.0)
-    for i, change, other, kept in (
-        (0, 1e-12, 0.0, 2.0),
-        (0, -3e-12, 0.0, 3.0),
-        (0, np.nan, 0.0, 3.0),
-        (0, 12.0 * (1e-12 + 7e-10), -7.0, 12.0),
-        (1, 13.0 * (1e-12 + 3e-10), 2.0, 13.0),
-        (1, 1e-12, 0.0, 13.0),
-    ):
-        kernels.keep_largest(METHOD, run, i, change, other)
-        assert run.lateness == pytest.approx(kept, rel=1e-12)
-
-
-def kept(function, t, *given, marker=0, target=1, since_entry=2.0):
-    """The changes of two components with the numbers beside, in a system whose functions are linear in time.
-
-    The fields of the modes are ``(4 t, x_1)`` and ``(8 t, 7)``, the guard of the second transition is
-    ``x_0 + 2 t`` and its reset ``(t x_0, x_1 - t)``.
-    """
-    changes = []
-
-    def field(mode, t, x, parameters, out):
-        out[:] = (4.0 * t, x[1]) if mode == 0 else (8.0 * t, 7.0)
-
-    def guard(transition, t, x, parameters, out):
-        assert transition == 1
-        out[0] = x[0] + 2.0 * t
-
-    def guard_gradient(transition, t, x, parameters, out):
-        out[:] = 1.0, 0.0, 2.0
-
-    def reset(transition, t, x, parameters, out):
-        out[:] = t * x[0], x[1] - t
-
-    model = SimpleNamespace(
-        dimension=2,
-        parameters=None,
-        field=field,
-        guard=guard,
-        guard_gradient=guard_gradient,
-        reset=reset,
-        target=np.array([NO_MODE, target]),
-        marker=np.array([0, marker]),
-    )
-    run = SimpleNamespace(mode=0, phase=t, y=np.array([4.0, 6.0]), since_entry=since_entry)
-    names = ("field", "field_after", "new", "state", "trial")
-    work = SimpleNamespace(gradient=np.zeros(3), scalar=np.zeros(1), **{name: np.zeros(2) for name in names})
-    tested = plain(late, keep_largest=lambda method, run, i, *given: changes.append((i, *given)))
-    vars(tested)[function](model, METHOD, run, *given, work)
-    return changes
-
-
-@pytest.mark.parametrize("t", [2.0**30, -(2.0**30)])
-def test_a_step_changes_by_the_field_at_the_next_time(t):
-    later = EPSILON * 2.0**30
-    found = kept("late_step", t, 0.5)
-    assert found == [(0, 0.5 * 4.0 * later, 0.5 * 4.0 * t), (1, 0.0, 0.5 * 6.0)]
-
-
-def test_a_jump_comes_at_another_time_and_has_another_reset():
-    """To first order, the image at the shifted time is compared with the image of the path behind."""
-    t = 2.0**30
-    later = EPSILON * t
-    delay = 2.0 * later / (2.0 + 4.0 * t)
-    (_, first, image), (_, second, other) = kept("late_jump", t, 1)
-    assert (image, other) == (4.0 * t, 6.0 - t)
-    assert first == pytest.approx((t + later) * (4.0 + delay * 4.0 * t) - 4.0 * t - delay * 8.0 * t, rel=1e-9)
-    assert second == pytest.approx(-later + delay * (6.0 - 7.0), rel=1e-9)
-    # Where the guard hardly moves, the delay is no longer than the flight.
-    (_, first, _), _ = kept("late_jump", t, 1, since_entry=2.0**-120)
-    assert first == pytest.approx(4.0 * later, rel=1e-9)
-
-
-def test_markers_and_the_end_of_a_run_have_no_error_of_the_state():
-    assert kept("late_jump", 2.0**30, 1, marker=1) == []
-    assert kept("late_jump", 2.0**30, 1, target=NO_MODE) == []
 
 
 def machine(field, guard, reset=None, direction=-1):
