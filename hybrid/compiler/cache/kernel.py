@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import json
 import struct
+import threading
 from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
@@ -36,15 +37,22 @@ RESULTS = {
 
 
 class Code:
-    """The machine code of a module, which is loaded when the first of its functions is needed."""
+    """The machine code of a module, which is loaded when the first of its functions is needed.
+
+    Threads that need it load it once: what a second load replaces would be freed while it runs.
+    """
 
     def __init__(self, content: bytes, names: list[str]) -> None:
         self._content, self._names = content, names
+        self._loading, self._functions = threading.Lock(), dict[str, Any]()
 
-    @cached_property
+    @property
     def functions(self) -> dict[str, Any]:
         """The functions by name, each with its ``address``."""
-        return load(self._content, self._names)
+        with self._loading:
+            if not self._functions:
+                self._functions = load(self._content, self._names)
+        return self._functions
 
 
 class Kernel:

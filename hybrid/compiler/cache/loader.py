@@ -74,17 +74,22 @@ FORM = (PACKAGE / "compiler" / "cache" / "kernel.py", PACKAGE / "compiler" / "ca
 MESSAGE = "hybrid: compiling the kernels, once for all models (under a minute) ..."
 
 
-# Threads that need the same kernels compile them once.
-_COMPILING = threading.Lock()
+# Threads that need the same kernels compile and load them once: what a second load replaces would be freed
+# while it runs.
+_COMPILING = threading.RLock()
+_LOADED: dict[str, SimpleNamespace] = {}
 
 
-@cache
 def load_kernels(module: str = DRIVER) -> SimpleNamespace:
     """The kernels that a module exports, by name, compiled now or loaded from the cache.
 
     A line on standard error announces the compilation, once per process.
     """
+    if module in _LOADED:
+        return _LOADED[module]
     with _COMPILING:
+        if module in _LOADED:
+            return _LOADED[module]
         content = _on_disk(module)
         if content is None:
             with announced(MESSAGE):
@@ -96,7 +101,7 @@ def load_kernels(module: str = DRIVER) -> SimpleNamespace:
                 if content is None:
                     content = compiled(module)
                     keep(_path(module), content)
-    return SimpleNamespace(**kernels_in(content))
+        return _LOADED.setdefault(module, SimpleNamespace(**kernels_in(content)))
 
 
 def compiled(module: str) -> bytes:

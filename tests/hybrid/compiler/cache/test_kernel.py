@@ -3,7 +3,9 @@
 import gc
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from threading import Barrier
 
 import numpy as np
 import pytest
@@ -138,6 +140,22 @@ def test_a_missing_argument(kernels):
 def test_the_code_is_loaded_when_it_is_needed():
     content = file_of({"f": ["int64", "int64"]}, b"no machine code")
     assert kernels_in(content)["f"].name == "f"
+
+
+def test_threads_load_the_code_once(content):
+    """Code that one thread has loaded is not replaced, and so freed, by another one."""
+    threads, interval = 8, sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    for _ in range(20):
+        kernels, together = kernels_in(content), Barrier(threads)
+
+        def address(_, kernels=kernels, together=together):
+            together.wait()
+            return kernels["double"].address
+
+        with ThreadPoolExecutor(threads) as pool:
+            assert len(set(pool.map(address, range(threads)))) == 1
+    sys.setswitchinterval(interval)
 
 
 def test_the_file_needs_no_compiler(content, tmp_path):
