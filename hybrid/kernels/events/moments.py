@@ -1,8 +1,9 @@
 """The sign of a guard along the flow, a moment before or after a place where rounding hides it.
 
-A guard that rounding cannot tell from zero is on the side to which the flow takes it: it has the sign of
-the first moment at which rounding no longer hides it. That holds for a guard that leaves zero by its speed,
-by its acceleration or by a higher derivative, at a kink, and where the guard jumps: no derivative is needed.
+A guard that rounding cannot tell from zero is on the side to which the flow takes it. Its speed tells the
+side if it has one sign for all that rounding may have made of the state. Otherwise the sign of the guard
+itself does, at the first moment at which rounding no longer hides it. That holds for a guard that leaves zero
+by its acceleration or by a higher derivative, at a kink, and where the guard jumps.
 
 The moments grow from the rounding of the time. Each is one step of the classical Runge-Kutta method, whose
 error goes with the fifth power of the step. Up to the fifth root of rounding, in units of the time in which
@@ -33,10 +34,6 @@ SHARE = ROUNDING_OF_STATE * EPSILON
 LONGER = 16.0
 # The longest moment, in units of the time in which the state changes by its size.
 LONGEST = EPSILON**0.2
-# A guard leaves zero by its speed if that keeps this share of itself until the guard is clear of zero: until
-# the speed has moved it by so many times its rounding.
-BY_ITS_SPEED = 0.5
-CLEAR = 2.0 / BY_ITS_SPEED
 
 
 class Place(NamedTuple):
@@ -108,17 +105,23 @@ def move_for(model, mode, t, x, moment, out, work):
 
 
 @njit(**KERNEL)
-def keeps_speed(model, transition, place, way, speed, moment, work):
-    """Whether a guard keeps half of its ``speed`` until the ``moment`` at which it is clear of zero.
+def is_certain(model, transition, place, speed, drift, moment, work):
+    """Whether the ``speed`` of a guard has its sign for all that rounding may have made of the state.
 
-    ``work.field`` and ``work.gradient`` are current.
+    It must exceed its rounding ``drift``. That of a bent guard, which may turn, must do so a ``moment`` of
+    rounding before and after the place, too. ``work.field`` is current.
     """
-    mode, t, x = place
-    for i in range(model.dimension):
-        work.settled[i] = x[i] + way * moment * work.field[i]
-    model.field(mode, t + way * moment, work.settled, model.parameters, work.field_after)
-    then = guard_speed(model, transition, t + way * moment, work.settled, work.field_after, work.gradient)
-    return then * speed > BY_ITS_SPEED * speed * speed
+    _, t, x = place
+    if not drift < abs(speed) < math.inf:
+        return False
+    for part in range(0 if model.affine_guard[transition] == 1 else 2):
+        way = moment if part == 0 else -moment
+        for i in range(model.dimension):
+            work.settled[i] = x[i] + way * work.field[i]
+        there = guard_speed(model, transition, t + way, work.settled, work.field, work.gradient)
+        if not there * speed > 0.0:
+            return False
+    return True
 
 
 @njit(**KERNEL)
@@ -126,28 +129,25 @@ def sign_along(model, run, transition, place, way, work):
     """The sign of a guard along the flow, and the first moment when it is certain; zeros if there is none.
 
     ``way`` is 1 for what comes after the ``place`` of a run, and -1 for what came before. Third comes whether
-    the speed of the guard at the place explains the sign. ``work.field`` is current, and is on return. The
-    state at the moment is left in ``work.settled``.
+    the speed of the guard at the place tells. ``work.field`` is current, and is on return.
     """
     mode, t, x = place
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
     drift = speed_rounding(model, run, transition, mode, t, x, work)
-    shortest = moment_of_rounding(model, run, t, work)
-    longest = max(LONGEST * unit_of_time(model, run, work), EPSILON * size_of_time(model, t))
-    if drift < abs(speed) < math.inf:
-        band = rounding_band(model, run, transition, t, x, work)
-        moment = max(CLEAR * band / abs(speed), shortest)
-        if moment <= longest and keeps_speed(model, transition, place, way, speed, moment, work):
-            return (1 if speed * way > 0.0 else -1), moment, True
-    least, moment = drift if drift < math.inf else 0.0, LONGER * shortest
+    moment = LONGER * moment_of_rounding(model, run, t, work)
+    if is_certain(model, transition, place, speed, drift, moment, work):
+        return (1 if speed * way > 0.0 else -1), moment, True
+    longest = LONGEST * unit_of_time(model, run, work)
+    if not drift < math.inf:
+        drift = 0.0
     while moment <= longest:
         later = t + way * moment
         move_for(model, mode, t, x, way * moment, work.settled, work)
         value = guard_value(model, transition, later, work.settled, work.scalar)
-        if abs(value) > moment * least:
+        if abs(value) > moment * drift:
             model.guard_gradient(transition, later, work.settled, model.parameters, work.gradient)
             band = rounding_band(model, run, transition, later, work.settled, work)
-            if abs(value) > band + moment * least:
+            if abs(value) > band + moment * drift:
                 return (1 if value > 0.0 else -1), moment, False
         moment *= LONGER
     return 0, 0.0, False
