@@ -3,7 +3,7 @@
 # Relative to tests/hybrid. The tests of the same name, in the same place of the tree, come first in any case.
 NEAREST = {
     "hybrid/accuracy/global_error.py": ("accuracy/test_global_error.py", "accuracy/test_work_precision.py"),
-    "hybrid/arguments.py": ("test_arguments_rules.py",),
+    "hybrid/arguments.py": ("test_argument_checks.py",),
     "hybrid/compiler/bounds/forcing.py": ("compiler/bounds/test_pulses_in_state.py",),
     "hybrid/compiler/bounds/program.py": (
         "kernels/events/test_proved_crossings.py",
@@ -23,7 +23,6 @@ NEAREST = {
         "kernels/events/test_proved_crossings.py",
         "compiler/test_compiled.py",
     ),
-    "hybrid/compiler/llvm/builder.py": ("compiler/llvm/test_builder_rules.py",),
     "hybrid/compiler/llvm/calls.py": ("compiler/llvm/test_lowering.py", "kernels/arithmetic/test_doubled.py"),
     "hybrid/compiler/llvm/engine.py": (
         "compiler/llvm/test_machine.py",
@@ -263,19 +262,13 @@ NEAREST = {
     "hybrid/sweep/rows.py": ("sweep/test_many.py", "../lyapunov/test_chart.py"),
     "hybrid/sweep/sheet.py": ("sweep/test_outcome.py", "sweep/test_sweep.py"),
     "hybrid/symbolic/expressions.py": (
-        "symbolic/test_expressions_rules.py",
         "symbolic/test_tracing.py",
         "symbolic/test_derivatives.py",
         "compiler/taylor/test_series.py",
     ),
-    "hybrid/symbolic/printer.py": ("symbolic/test_printer_rules.py",),
     "hybrid/symbolic/tracing.py": ("symbolic/test_tracing.py",),
     "hybrid/symbolic/ufuncs.py": ("symbolic/test_tracing.py", "compiler/test_operations.py"),
-    "hybrid/symbolic/values.py": (
-        "symbolic/test_values_rules.py",
-        "symbolic/test_tracing.py",
-        "compiler/test_operations.py",
-    ),
+    "hybrid/symbolic/values.py": ("symbolic/test_tracing.py", "compiler/test_operations.py"),
     "hybrid/system/functions.py": (
         "system/test_derivatives.py",
         "system/test_elements.py",

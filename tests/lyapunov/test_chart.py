@@ -371,6 +371,13 @@ def test_bad_arguments(arguments, message):
 def test_a_section_needs_a_period():
     with pytest.raises(hybrid.ArgumentError, match="per forcing period, but the system declares no period"):
         lyapunov.chart(models.bouncing_ball(), {"e": [0.8]}, (1.0, 0.0), section=5)
+    still = hybrid.HybridSystem(
+        state=("q",), parameters={"a": 1.0}, modes=[hybrid.Mode("m", lambda t, x, p: (-p.a * x.q,))]
+    )
+    with pytest.raises(
+        hybrid.ArgumentError, match=r"at=.jumps. takes a point at each jump, but the system has"
+    ):
+        lyapunov.chart(still, {"a": [1.0]}, (1.0,), section=5, at="jumps")
 
 
 def test_without_a_period_the_second_row_starts_where_the_transient_of_the_first_ends():

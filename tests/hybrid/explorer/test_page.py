@@ -49,7 +49,7 @@ def opened(request):
 
 @pytest.mark.parametrize("name", models.__all__)
 def test_every_model_opens(opened, name):
-    page = opened(getattr(models, name))
+    page = opened(getattr(models, name), query={"columns": "4"})
     assert page.board.live is not None
     assert len(page.board.live.arc.t) > 1
     assert "diagram" in page.board.calls or not page.scene.over

@@ -269,16 +269,9 @@ class TestNoOrbit:
         orbit = periodic_orbit(system, (1.0,), **({} if forced else period))
         assert orbit.status.code == StatusCode.NOT_CONVERGED
 
-    @pytest.mark.parametrize("pace", [1.0, 0.1, 1e-3, 1e-6])
+    @pytest.mark.parametrize("pace", [1.0, 1e-6])
     @pytest.mark.parametrize(
-        "rate",
-        [
-            lambda q: np.exp(-q),
-            lambda q: 1 / (1 + q**4),
-            lambda q: 1 / np.cosh(q),
-            lambda q: 1 / (1 + np.exp(q)),
-            lambda q: (1 + q**2) ** -1.5,
-        ],
+        "rate", [lambda q: np.exp(-q), lambda q: 1 / (1 + q**4), lambda q: (1 + q**2) ** -1.5]
     )
     @pytest.mark.parametrize("push", [0.0, 1.0])
     def test_a_drift_that_rounding_hides_is_no_orbit(self, rate, pace, push):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.linalg import expm
 
 import hybrid
 from hybrid import Guard, HybridSystem, Mode, Reset, StatusCode, Transition, simulate
@@ -76,6 +77,21 @@ class TestExactAnswers:
         assert len(simulate(chain, x0, (0.0, 60.0), samples=[60.0]).x[0]) == 12
         assert arc.fundamental.shape == (12, 2)
         assert energy(arc.x[-1]) == pytest.approx(energy(x0), rel=1e-10)
+
+    def test_tangent_vectors_of_many_states(self):
+        """Most cells of the Jacobian of a chain are zero; its fundamental matrix is an exponential."""
+        n = 12
+        stiffness = np.diag(np.full(n - 1, 1.0), 1) + np.diag(np.full(n - 1, 1.0), -1) - 2.0 * np.eye(n)
+        matrix = np.block([[np.zeros((n, n)), np.eye(n)], [stiffness, np.zeros((n, n))]])
+
+        def field(t, x, p):
+            q = np.concatenate([np.zeros_like(x[:1]), x[:n], np.zeros_like(x[:1])])
+            return np.concatenate([x[n:], q[2:] - 2 * q[1:-1] + q[:-2]])
+
+        chain = HybridSystem(state=2 * n, modes=[Mode("swing", field)])
+        for solver in (hybrid.Taylor(), hybrid.RadauIIA(rtol=1e-9)):
+            arc = simulate(chain, np.linspace(0.3, 1.0, 2 * n), (0.0, 2.0), solver=solver, tangent=True)
+            np.testing.assert_allclose(arc.fundamental, expm(2.0 * matrix), rtol=0, atol=1e-7)
 
     def test_functions_that_tracing_cannot_follow(self):
         def field(t, x, p):

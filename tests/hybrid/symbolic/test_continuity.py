@@ -265,6 +265,12 @@ def test_a_run_with_tangent_vectors_says_so():
     assert "its field jumps where q = 0: steps resolve it, tangent vectors are not valid beyond it" in told
 
 
+def test_an_angle_that_turns_is_told_in_words():
+    turning = friction(lambda t, x, p: (x.v, -np.arctan2(x.q, x.v)))
+    arc = hybrid.simulate(turning, (1.0, 0.0), (0.0, 1.0), tangent=True)
+    assert "the angle of (v, q) turns from pi to -pi" in arc.status.message
+
+
 def test_exponents_and_orbits_say_so():
     import lyapunov
 

@@ -146,3 +146,18 @@ def test_default_parameters_without_a_period(period):
     for parameters in (None, {}, {"a": 2.0}):
         with pytest.raises(ArgumentError, match="HybridSystem: period"):
             simulate(system, (1.0,), (0.0, 1.0), parameters=parameters)
+
+
+@pytest.mark.parametrize(
+    ("period", "told"),
+    [
+        (lambda p: p.w - 2.0, r"must be positive; got -1\.0\. Check the parameters"),
+        (lambda p: 1e300 / (p.w * 1e-300), "must be finite; got inf"),
+        (lambda p: 1 / (p.w - 1), "must be finite; got inf"),
+    ],
+)
+def test_parameters_at_which_the_period_is_none(period, told):
+    modes = [Mode("m", lambda t, x, p: (-p.w * x.q,))]
+    system = HybridSystem(state=("q",), parameters={"w": 3.0}, modes=modes, period=period)
+    with pytest.raises(ArgumentError, match=f"HybridSystem: period {told}"):
+        simulate(system, (1.0,), (0.0, 1.0), parameters={"w": 1.0})

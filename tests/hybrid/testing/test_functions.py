@@ -3,53 +3,8 @@
 import numpy as np
 import pytest
 
-import hybrid
 from hybrid import HybridSystem, Mode
-from hybrid.testing import Case, PropertyError, check_system, functions
-
-SWING = hybrid.HybridSystem(
-    state=("q", "v"),
-    parameters={"a": 0.5, "w": 2.0},
-    modes=[hybrid.Mode("m", lambda t, x, p: (x.v, p.a * np.sin(p.w * t) - x.q))],
-    transitions=[hybrid.Transition("m", "m", hybrid.Guard(lambda t, x, p: x.q - 1.0), name="wall")],
-    period=lambda p: 2 * np.pi / p.w,
-)
-
-
-@pytest.mark.parametrize(("t0", "phase"), [(0.25, 0.25), (7.0, 7.0 % np.pi), (-1.0, np.pi - 1.0)])
-def test_functions_are_compared_at_the_phase_of_the_start(t0, phase, monkeypatch):
-    """A start far from zero has rounding of its own in the time."""
-    asked = []
-
-    def asked_for(variables, function, t, x, values, period):
-        asked.append((function.owner, t, x.tolist(), values.tolist(), period))
-
-    monkeypatch.setattr(functions, "period_fault_at", asked_for)
-    functions.check_period(Case(SWING, {"a": 0.25, "w": 2.0}, "m", (0.5, -1.0), t0, t0 + 1.0))
-    assert asked == [
-        (each, phase, [0.5, -1.0], [0.25, 2.0], np.pi) for each in ("Mode 'm'", "Transition 'wall'")
-    ]
-
-
-def test_a_fault_is_told(monkeypatch):
-    monkeypatch.setattr(functions, "period_fault_at", lambda *given: "one period later it differs")
-    with pytest.raises(hybrid.testing.PropertyError, match="one period later it differs"):
-        functions.check_period(Case(SWING, {"a": 0.25, "w": 2.0}, "m", (0.5, -1.0), 0.0, 1.0))
-
-
-def test_compiled_functions_are_compared_at_the_start(monkeypatch):
-    asked = []
-
-    def disagreement(compiled, function, index, t, x, values, value):
-        asked.append((compiled is hybrid.compile_system(SWING), index, t, x.tolist(), values.tolist()))
-        return "it is 2, not 3" if len(asked) == 3 else None
-
-    monkeypatch.setattr(functions, "disagreement", disagreement)
-    case = Case(SWING, {"a": 0.25, "w": 2.0}, "m", (0.5, -1.0), 7.0, 8.0)
-    functions.check_compiled(case)
-    assert asked == [(True, 0, 7.0, [0.5, -1.0], [0.25, 2.0])] * 2
-    with pytest.raises(hybrid.testing.PropertyError, match="it is 2, not 3"):
-        functions.check_compiled(case)
+from hybrid.testing import PropertyError, check_system
 
 
 def forced(period, force=lambda t, x, p: np.cos(p.w * t)):

@@ -120,7 +120,7 @@ def allowed_error(shape, solver, height, width):
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@settings(max_examples=60)
+@settings(max_examples=25)
 @given(place=places, width=widths, height=heights, solver=st.sampled_from(SOLVERS))
 def test_an_oscillator_at_rest_answers_a_pulse(shape, place, width, height, solver):
     parameters = {"A": height, "a": place, "w": width}
@@ -134,7 +134,7 @@ def test_an_oscillator_at_rest_answers_a_pulse(shape, place, width, height, solv
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(place=places, width=widths, height=heights, solver=st.sampled_from(SOLVERS))
 def test_a_lag_at_rest_answers_a_pulse(shape, place, width, height, solver):
     parameters = {"A": height, "a": place, "w": width}
@@ -222,7 +222,7 @@ def driven_lag(train):
 
 
 @pytest.mark.parametrize("train", TRAINS)
-@settings(max_examples=30)
+@settings(max_examples=15)
 @given(
     place=st.floats(0.3, 4.7),
     width=st.floats(-4.0, -1.5).map(lambda exponent: 10.0**exponent),

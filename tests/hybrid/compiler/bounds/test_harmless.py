@@ -132,7 +132,7 @@ products = st.lists(powers, min_size=1, max_size=3).map(
 )
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(product=products)
 def test_a_harmless_product_is_not_small_almost_everywhere(product):
     with np.errstate(over="ignore", invalid="ignore"):
@@ -180,7 +180,7 @@ def response(pulse, n, a):
     return np.sum(np.exp(s - a - 1) * PULSES[pulse](s, Place(a), n) * weights * half[:, None])
 
 
-@pytest.mark.parametrize("n", [30, 1000, 10**5])
+@pytest.mark.parametrize("n", [30, 10**5])
 @pytest.mark.parametrize("pulse", PULSES)
 @settings(max_examples=15)
 @given(a=st.floats(20.0, 90.0), solver=st.sampled_from(SOLVERS))

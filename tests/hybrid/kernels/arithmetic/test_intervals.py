@@ -106,7 +106,7 @@ def intervals():
 
 
 @pytest.mark.parametrize("code", FUNCTIONS)
-@settings(suppress_health_check=[HealthCheck.filter_too_much])
+@settings(max_examples=30, suppress_health_check=[HealthCheck.filter_too_much])
 @given(intervals())
 def test_a_function_lies_within_its_bounds(code, case):
     low, high, u = case
@@ -130,7 +130,7 @@ def test_a_function_lies_within_its_bounds(code, case):
 
 
 @pytest.mark.parametrize("code", FUNCTIONS)
-@settings(suppress_health_check=[HealthCheck.filter_too_much])
+@settings(max_examples=30, suppress_health_check=[HealthCheck.filter_too_much])
 @given(intervals())
 def test_a_difference_is_at_most_the_slope_times_the_distance(code, case):
     low, _, u = case
@@ -164,7 +164,7 @@ def extremes(function, low, high):
 
 
 @pytest.mark.parametrize("code", FUNCTIONS)
-@settings(max_examples=100, suppress_health_check=[HealthCheck.filter_too_much])
+@settings(max_examples=40, suppress_health_check=[HealthCheck.filter_too_much])
 @given(moderate, st.floats(-0.9, 0.9), st.floats(-0.9, 0.9))
 def test_bounds_are_no_wider_than_rounding_makes_them(code, interval, one, other):
     low, high = sorted((one, other)) if code in (op.ASIN, op.ACOS, op.ATANH) else interval

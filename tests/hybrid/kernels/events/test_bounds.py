@@ -146,7 +146,7 @@ paths = st.lists(st.lists(coefficient, min_size=5, max_size=5), min_size=3, max_
 pieces = st.tuples(st.floats(0.05, 0.9), st.sampled_from([1e-6, 1e-3, 0.05]))
 
 
-@settings(max_examples=200)
+@settings(max_examples=80)
 @given(expressions({**SMOOTH, **JUMPING}), paths, pieces, st.sampled_from([-1, 2]))
 def test_values_slopes_and_middles_are_enclosed(expression, path, piece, clock):
     middle, radius = piece
@@ -166,7 +166,7 @@ def test_values_slopes_and_middles_are_enclosed(expression, path, piece, clock):
     assert row[LEAST_SLOPE] - slack <= slopes.min() <= slopes.max() <= row[MOST_SLOPE] + slack
 
 
-@settings(max_examples=200)
+@settings(max_examples=80)
 @given(expressions(), paths, st.floats(0.05, 0.9), st.sampled_from([-1, 2]))
 def test_bounds_of_one_place_are_its_value_and_slope(expression, path, place, clock):
     around = expression.parts_along(path, place + 1e-6 * np.arange(-1.0, 2.0), clock)
@@ -316,7 +316,7 @@ def test_around_a_pole_nothing_is_known():
     assert row[MOST_SLOPE] < 0.0
 
 
-@settings(max_examples=200)
+@settings(max_examples=80)
 @given(expressions(depth=2), st.lists(st.floats(0.7, 1.3), min_size=3, max_size=3), st.floats(0.5, 2.0))
 def test_rounding_moves_an_expression_by_its_gradient(expression, x, t):
     scale, clock, share = [1.0, 3.0, 0.25], 5.0, 1e-7

@@ -9,7 +9,7 @@ from hybrid import DOP853, Guard, HybridSystem, Mode, RadauIIA, Reset, Taylor, T
 
 POWERS = {"cube": lambda z: z**3, "signed square": lambda z: z * np.abs(z), "fifth power": lambda z: z**5}
 SOLVERS = {"Taylor": Taylor(), "DOP853": DOP853(), "RadauIIA": RadauIIA()}
-END, DRAWS = 10.0, 250
+END, DRAWS = 10.0, 100
 
 
 def swinging(t, a, b, s):

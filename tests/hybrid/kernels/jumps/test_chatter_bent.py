@@ -90,7 +90,7 @@ def balls(count, shake):
 @pytest.mark.parametrize("shake", [0.0, 1.0], ids=["still", "shaken"])
 @pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
 def test_tangent_map(solver, shake):
-    for p, x0, t1 in balls(60, shake):
+    for p, x0, t1 in balls(20, shake):
         arc = simulate(BALL, x0, (START, t1), mode="fly", parameters=p, tangent=True, solver=solver)
         assert arc.status.code.name == "SUCCESS"
         assert arc.mode[-1] == "rest"

@@ -125,7 +125,7 @@ def reference(name, values, start):
 def test_random_systems_beside_a_slow_reference(name):
     rng = np.random.default_rng(20)
     stuck, together = 0, 0
-    for trial in range(400):
+    for trial in range(200):
         values, start = drawn(rng)
         arc = simulate(
             system(name),
@@ -153,7 +153,7 @@ def test_random_systems_beside_a_slow_reference(name):
             assert arc.status.code in (StatusCode.SUCCESS, StatusCode.AMBIGUOUS_ORDER), told
             assert arc.mode[-1] == expected.mode
     # Check that many of the drawn transitions fire together.
-    assert together + stuck > 25
+    assert together + stuck > 12
 
 
 @pytest.mark.parametrize("name", STRUCTURES)
