@@ -3,7 +3,6 @@
 # Relative to tests/hybrid. The tests of the same name, in the same place of the tree, come first in any case.
 NEAREST = {
     "hybrid/accuracy/global_error.py": ("accuracy/test_global_error.py", "accuracy/test_work_precision.py"),
-    "hybrid/arguments.py": ("test_argument_checks.py",),
     "hybrid/compiler/bounds/forcing.py": ("compiler/bounds/test_pulses_in_state.py",),
     "hybrid/compiler/bounds/program.py": (
         "kernels/events/test_proved_crossings.py",
@@ -138,20 +137,7 @@ NEAREST = {
     ),
     "hybrid/kernels/events/sections.py": ("orbits/test_sections.py",),
     "hybrid/kernels/events/touches.py": ("kernels/events/test_grazing.py",),
-    "hybrid/kernels/jumps/chatter.py": (
-        "kernels/jumps/test_chatter_units.py",
-        "kernels/jumps/test_chatter_bent.py",
-        "kernels/jumps/test_chatter_tangents.py",
-        "kernels/jumps/test_skipped.py",
-        "kernels/jumps/test_rounds.py",
-    ),
     "hybrid/kernels/jumps/corner.py": ("kernels/jumps/test_one_instant.py", "kernels/jumps/test_instant.py"),
-    "hybrid/kernels/jumps/drift.py": (
-        "kernels/jumps/test_chatter_bent.py",
-        "kernels/jumps/test_rounds.py",
-        "kernels/jumps/test_skipped.py",
-    ),
-    "hybrid/kernels/jumps/endless.py": ("kernels/jumps/test_endless.py",),
     "hybrid/kernels/jumps/jump.py": (
         "simulation/test_saltation.py",
         "kernels/jumps/test_instant.py",
@@ -166,12 +152,34 @@ NEAREST = {
         "kernels/events/test_grazing.py",
     ),
     "hybrid/kernels/jumps/record.py": ("simulation/test_saltation.py", "kernels/jumps/test_locked.py"),
-    "hybrid/kernels/jumps/rounds.py": (
-        "kernels/jumps/test_chatter.py",
-        "kernels/jumps/test_chatter_tangents.py",
-    ),
-    "hybrid/kernels/jumps/skipped.py": ("kernels/jumps/test_chatter.py",),
+    "hybrid/kernels/jumps/past.py": ("kernels/jumps/test_rounds.py", "kernels/jumps/test_chatter.py"),
+    "hybrid/kernels/jumps/rest.py": ("kernels/jumps/test_chatter.py", "kernels/jumps/test_plastic.py"),
     "hybrid/kernels/jumps/steep.py": ("simulation/test_infinite_slopes.py",),
+    "hybrid/kernels/limit/endless.py": ("kernels/jumps/test_endless.py",),
+    "hybrid/kernels/limit/go.py": (
+        "kernels/jumps/test_chatter.py",
+        "kernels/jumps/test_rounds.py",
+        "kernels/jumps/test_skipped.py",
+        "kernels/jumps/test_endless.py",
+        "kernels/jumps/test_collapse.py",
+        "kernels/jumps/test_instant.py",
+    ),
+    "hybrid/kernels/limit/impacts.py": (
+        "kernels/jumps/test_chatter.py",
+        "kernels/jumps/test_chatter_flat.py",
+        "kernels/jumps/test_plastic.py",
+    ),
+    "hybrid/kernels/limit/rounds.py": (
+        "kernels/jumps/test_rounds.py",
+        "kernels/jumps/test_grooves.py",
+        "kernels/jumps/test_chatter.py",
+    ),
+    "hybrid/kernels/limit/tangent.py": (
+        "kernels/jumps/test_chatter_bent.py",
+        "kernels/jumps/test_chatter_tangents.py",
+        "kernels/jumps/test_chatter_units.py",
+        "kernels/jumps/test_chatter.py",
+    ),
     "hybrid/kernels/steps/dense.py": (
         "simulation/test_arc.py",
         "compiler/taylor/test_series.py",

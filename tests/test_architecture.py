@@ -54,7 +54,17 @@ ROOMS = (
 )
 KERNEL_ROOMS = tuple(
     f"hybrid.kernels.{name}"
-    for name in ("types", "instructions", "arithmetic", "events", "steps", "jumps", "evaluate", "drive")
+    for name in (
+        "types",
+        "instructions",
+        "arithmetic",
+        "events",
+        "steps",
+        "jumps",
+        "limit",
+        "evaluate",
+        "drive",
+    )
 )
 HEAVY = ("matplotlib", "networkx", "numba", "pandas", "pint", "scipy", "sympy", "xarray")
 MAX_LINES = 500

@@ -9,7 +9,7 @@ from hybrid.kernels.events.guards import (
     guard_value,
     rounding_band,
 )
-from hybrid.kernels.jumps.limits import may_accumulate
+from hybrid.kernels.limit.go import may_accumulate
 from hybrid.kernels.steps.disguised_jumps import leave
 from hybrid.kernels.steps.late import is_late
 from hybrid.kernels.steps.series import series_step

@@ -161,7 +161,7 @@ def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> A
         "scale": (n,),
         "stretch": (n,),
         "growth": (tangents,),
-        "trail": (5, n + 1),
+        "trail": (4, n + 1),
         "before": (n * tangents,),
         "growth_before": (tangents,),
         "instant": (n * (1 + n),),

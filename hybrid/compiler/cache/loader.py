@@ -36,7 +36,7 @@ from hybrid.kernels.types.kinds import text_of
 from hybrid.symbolic.branches import PARSER
 
 DRIVER = "hybrid.kernels.drive"
-LIMITS = "hybrid.kernels.jumps.limits"
+LIMITS = "hybrid.kernels.limit.go"
 # While this process compiles the driver, a second one compiles what every run needs too, and then what most
 # runs never call.
 IN_SECOND = (

@@ -1,1 +1,1 @@
-"""What happens at an instant: resets, saltation, chatter, rest, several transitions at once."""
+"""What happens at an instant: resets, saltation, rest, several transitions at once."""

@@ -19,12 +19,6 @@ from hybrid.kernels.events.guards import (
 )
 from hybrid.kernels.events.sides import mode_of_limit
 from hybrid.kernels.events.surface import finds_surface
-from hybrid.kernels.jumps.chatter import (
-    BEFORE,
-    STEADY,
-    chatter_matrix,
-    remember_impulse,
-)
 from hybrid.kernels.jumps.locked import (
     begin_at_start,
     begin_instant,
@@ -35,12 +29,14 @@ from hybrid.kernels.jumps.locked import (
     postpone_map,
     restore_tangents,
 )
+from hybrid.kernels.jumps.past import remember_impulse, remember_visit, slot_of
 from hybrid.kernels.jumps.record import remember_jump
-from hybrid.kernels.jumps.rounds import remember_visit, slot_of
+from hybrid.kernels.jumps.rest import rest_matrix
 from hybrid.kernels.jumps.steep import is_steep, is_steep_behind, keep_unknown_time
 from hybrid.kernels.types.codes import (
     ENTERING,
     GRAZING,
+    IMPULSE,
     NO_MODE,
     NO_TRANSITION,
     TRANSVERSE,
@@ -157,12 +153,12 @@ def carry_tangents(model, run, tangents, orthonormal, apart, work):
 
 @njit(**INLINE)
 def ends_own_flight(model, run, transition, transversality):
-    """Whether an impact ends the flight that the last one began, about as fast: a low bounce is no grazing.
+    """Whether an impact ends the flight that the last one began, at least half as fast.
 
-    All orbits nearby hit the guard too, because the pull leads them back to it.
+    A low bounce is no grazing: all orbits nearby hit the guard too, because the pull leads them back to it.
     """
     bounces = run.chattering > 0 and run.chatter_jumps == run.jumps and run.last_fired == transition
-    return bounces and abs(transversality) >= STEADY * run.trail[BEFORE, model.dimension]
+    return bounces and 2.0 * abs(transversality) >= run.trail[IMPULSE, model.dimension]
 
 
 @njit(**KERNEL)
@@ -346,7 +342,7 @@ def rest(task):
     limit_mode, onward = mode_of_limit(model, run, transition, run.phase, run.y, work)
     recall_map(model, run, tangents, work)
     change_mode_of_instant(model, run, limit_mode, work)
-    chatter_matrix(model, run, transition, work)
+    rest_matrix(model, run, transition, work)
     multiply(work.saltation, run.instant, n, n, work.state, work.rounding)
     if tangents > 0:
         map_of_instant(run, n, work.saltation)

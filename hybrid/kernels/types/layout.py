@@ -280,8 +280,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
       there the run has to get on. ``stretch_moved`` is 1 if the state has moved since.
     - ``growth (k,)``: sums of the logarithms of the lengths that orthonormalisation took out of the tangent
       vectors.
-    - ``trail (5, n + 1)``: follows the jumps of one transition to their limit; the last two rows mark the
-      components that jumps move for ever, at the limit in question and at any limit that was taken.
+    - ``trail (4, n + 1)``: follows jumps to their limit; its rows have names (``codes``).
     - ``before (n k,)``, ``growth_before (k,)``: the tangent vectors and their growth before a jump that sets
       off others at the same instant.
     - ``instant (n (1 + n),)``: the derivative of that instant, then the columns of the tangent map of its

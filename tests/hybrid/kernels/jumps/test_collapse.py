@@ -80,13 +80,21 @@ def run(m, e, q, v, t1, solver=None, at_rest=False):
     )
 
 
-@pytest.mark.parametrize("ratio", [1e4, 1e6])
-def test_pressed_to_the_floor(ratio):
+def test_pressed_to_the_floor():
     """All speed is lost in no time, but in more rounds than are followed at one instant."""
-    arc = run((1.0, ratio), (0.5, 0.8), (0.1, 0.2), (0.0, -1.0), 5.0)
+    arc = run((1.0, 1e6), (0.5, 0.8), (0.1, 0.2), (0.0, -1.0), 5.0)
     assert arc.status.code == StatusCode.STUCK
     assert "repeat endlessly" in arc.status.message
     assert arc.t[-1] < 5.0
+
+
+@pytest.mark.parametrize(("ratio", "limit"), [(1e3, 0.183425490426022), (1e4, 0.1832368289832754)])
+def test_pressed_to_the_floor_by_less(ratio, limit):
+    """The limit of flights that are followed one by one."""
+    arc = run((1.0, ratio), (0.5, 0.8), (0.1, 0.2), (0.0, -1.0), 5.0)
+    assert arc.status.code == StatusCode.ACCUMULATION
+    assert arc.t[-1] == pytest.approx(limit, rel=1e-14)
+    np.testing.assert_allclose(arc.x[-1], 0.0, rtol=0, atol=1e-5)
 
 
 @pytest.mark.parametrize("ratio", [10.0, 100.0, 1e3, 1e4, 3e4])
