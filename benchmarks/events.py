@@ -1,7 +1,7 @@
 """Counts crossings missed or doubled at random near-double roots, and measures errors of event times.
 
-``python -m benchmarks.events --pairs 1000000`` passes that many polynomials with known roots to the root
-isolation of the library. Fewer such motions are run with the library's solvers and with SciPy.
+``python -m benchmarks.events --runs 2000`` runs that many motions with known roots, with each solver
+of the library and with SciPy.
 """
 
 from __future__ import annotations
@@ -12,20 +12,12 @@ import time
 from fractions import Fraction
 
 import numpy as np
-from numba import njit
 from scipy.integrate import solve_ivp
-from scipy.special import comb
 
 import models
 from benchmarks.common import heading, table
 from hybrid import DOP853, Guard, HybridSystem, Mode, Reset, Taylor, Transition, Tsit5, simulate
-from hybrid.kernels.arithmetic.bernstein import NO_ROOT, first_crossing, restrict
-from hybrid.simulation.memory import ISOLATION_DEPTH
 
-DEGREE = 7
-BATCH = 50_000
-# Two roots can be resolved if the polynomial between them exceeds this share of its coefficients.
-ROUNDING = 64 * np.finfo(float).eps
 TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
 
 
@@ -41,84 +33,7 @@ def random_pairs(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.n
     return roots, rng.uniform(-0.5, 1.5, (count, 2)), rng.uniform(0.3, 1.0, (count, 2))
 
 
-def bernstein(roots: np.ndarray, real: np.ndarray, imaginary: np.ndarray) -> np.ndarray:
-    """Bernstein coefficients ``(count, 7)`` of the polynomials, multiplied factor by factor."""
-    rows = product(linear(roots[:, 0]), linear(roots[:, 1]))
-    for a, b in zip(real.T, imaginary.T, strict=True):
-        square = product(linear(a), linear(a))
-        rows = product(rows, square + (b * b)[:, None])
-    return rows
-
-
-def linear(root: np.ndarray) -> np.ndarray:
-    return np.column_stack([-root, 1 - root])
-
-
-def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    m, n = a.shape[1] - 1, b.shape[1] - 1
-    out = np.zeros((len(a), m + n + 1))
-    for i in range(m + 1):
-        for j in range(n + 1):
-            out[:, i + j] += comb(m, i) * comb(n, j) / comb(m + n, i + j) * a[:, i] * b[:, j]
-    return out
-
-
-@njit
-def count_crossings(polynomials, found, stack):
-    """Add to ``found (count,)`` the crossings that the isolation finds one after another, up to three."""
-    degree = polynomials.shape[1] - 1
-    rest = np.empty(degree + 1)
-    for row in range(polynomials.shape[0]):
-        rest[:] = polynomials[row]
-        side, start = 0, 0.0
-        for _ in range(3):
-            if side == 0:
-                side = 1 if rest[0] > 0.0 else -1
-            theta, after = first_crossing(rest, degree, side, 0, stack)
-            if theta == NO_ROOT:
-                break
-            found[row] += 1
-            side = after
-            if theta >= 1.0:
-                break
-            restrict(rest, degree, theta)
-            rest[0] = 0.0
-            start += theta * (1.0 - start)
-
-
-def isolation(rng: np.random.Generator, pairs: int) -> list[list[str]]:
-    stack = np.zeros((ISOLATION_DEPTH, DEGREE + 6))
-    missed = doubled = unresolved = 0
-    begin = time.perf_counter()
-    for done in range(0, pairs, BATCH):
-        count = min(BATCH, pairs - done)
-        roots, real, imaginary = random_pairs(rng, count)
-        polynomials = bernstein(roots, real, imaginary)
-        found = np.zeros(count, dtype=np.int64)
-        count_crossings(polynomials, found, stack)
-        # Compare the dip between the roots with the rounding of the coefficients.
-        middle = 0.5 * roots.sum(axis=1)
-        depth = (0.5 * (roots[:, 1] - roots[:, 0])) ** 2
-        for a, b in zip(real.T, imaginary.T, strict=True):
-            depth *= (middle - a) ** 2 + b**2
-        seen = depth > ROUNDING * np.abs(polynomials).max(axis=1)
-        missed += int(((found < 2) & seen).sum())
-        doubled += int(((found > 2) & seen).sum())
-        unresolved += int(((found != 2) & ~seen).sum())
-    seconds = time.perf_counter() - begin
-    return [
-        [
-            "isolation alone",
-            str(pairs),
-            str(missed),
-            str(doubled),
-            str(unresolved),
-            f"{seconds / pairs * 1e6:.1f} us",
-        ]
-    ]
-
-
-# The same roots as a motion: x' is the derivative of the polynomial, and the roots are parameters.
+# The roots as those of a motion: x' is the derivative of the polynomial, and the roots are parameters.
 def polynomial_motion(bent: bool) -> HybridSystem:
     def derivative(t, p):
         a, b = t - p.r1, t - p.r2
@@ -251,12 +166,11 @@ def event_times() -> list[list[str]]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--pairs", type=int, default=1_000_000, help="polynomials through the isolation")
     parser.add_argument("--runs", type=int, default=2000, help="runs per solver, and with SciPy")
     arguments = parser.parse_args()
     heading("Crossings found of two that are 10^-u apart in a unit interval, u uniform in 0..8.")
     rng = np.random.default_rng(0)
-    rows = isolation(rng, arguments.pairs) + whole_runs(rng, arguments.runs)
+    rows = whole_runs(rng, arguments.runs)
     table(["", "pairs", "missed", "doubled", "other than two, dip within tolerance", "time per pair"], rows)
     print("Error of the times of ten bounces of a ball, e = 0.5, in units in the last place.\n")
     table(["solver", "rtol = 100 atol", "first", "largest"], event_times())

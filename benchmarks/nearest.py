@@ -81,7 +81,8 @@ NEAREST = {
         "kernels/events/test_proved_crossings.py",
         "kernels/events/test_crossings.py",
     ),
-    "hybrid/kernels/events/crossings.py": (
+    "hybrid/kernels/guards/isolate.py": (
+        "kernels/events/test_polynomials.py",
         "kernels/events/test_crossings.py",
         "kernels/events/test_proved_crossings.py",
         "kernels/events/test_jumps_and_gaps.py",
@@ -103,7 +104,7 @@ NEAREST = {
         "kernels/jumps/test_one_instant.py",
         "kernels/events/test_crossings.py",
     ),
-    "hybrid/kernels/events/hidden.py": ("kernels/events/test_sampled.py", "kernels/events/test_lift_off.py"),
+    "hybrid/kernels/guards/hidden.py": ("kernels/events/test_sampled.py", "kernels/events/test_lift_off.py"),
     "hybrid/kernels/events/initial_mode.py": (
         "simulation/test_simulate.py",
         "kernels/jumps/test_instant.py",
@@ -121,7 +122,7 @@ NEAREST = {
         "kernels/steps/test_series.py",
     ),
     "hybrid/kernels/events/resolution.py": ("kernels/events/test_touches.py",),
-    "hybrid/kernels/events/sampled.py": (
+    "hybrid/kernels/guards/sampled.py": (
         "kernels/events/test_forms.py",
         "kernels/events/test_jumps_and_gaps.py",
         "kernels/events/test_domain.py",
@@ -136,7 +137,7 @@ NEAREST = {
         "kernels/events/test_curvature.py",
     ),
     "hybrid/kernels/events/sections.py": ("orbits/test_sections.py",),
-    "hybrid/kernels/events/touches.py": ("kernels/events/test_grazing.py",),
+    "hybrid/kernels/guards/touch.py": ("kernels/events/test_grazing.py",),
     "hybrid/kernels/jumps/corner.py": ("kernels/jumps/test_one_instant.py", "kernels/jumps/test_instant.py"),
     "hybrid/kernels/jumps/jump.py": (
         "simulation/test_saltation.py",

@@ -59,6 +59,7 @@ KERNEL_ROOMS = tuple(
         "instructions",
         "arithmetic",
         "events",
+        "guards",
         "steps",
         "jumps",
         "limit",

@@ -98,7 +98,7 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int, rows: 
         "saltation": (n, n),
         "sizes": (n, n),
         "rounding": (4, n),
-        "path": (degree + 1, n),
+        "path": (degree + 1, n + 1),
         "polynomial": (width,),
         "stack": (ISOLATION_DEPTH, width),
         "intervals": (ISOLATION_DEPTH, 2),
@@ -106,7 +106,7 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int, rows: 
         "pivots": ((coupled + 1) * n,),
         "series": (codes.HIGHEST_ORDER + 3, width_of_series) if method.order else (0, 0),
         "weights": (1, width_of_series),
-        "registers": (rows, codes.REGISTERS),
+        "registers": (max(rows, 1), codes.REGISTERS),
         "samples": (max(len(method.nodes), len(method.series_nodes)) + 1, 2 * rows),
         "places": (len(method.nodes) + max(stages - len(method.b) - 1, 0), n + 1),
     }

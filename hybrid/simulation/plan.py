@@ -105,7 +105,6 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: i
             solver.attempt,
             steps=compiled.takes_steps(kinds),
             forced=bool(emitted.forcing_component),
-            beside_series=not all(emitted.guard_in_series),
             tangents=tangents > 0,
             abrupt=tangents > 0 and any(emitted.abrupt),
             timed=compiled.is_timed,
@@ -173,16 +172,15 @@ def driver_parts(
     *,
     steps: bool,
     forced: bool,
-    beside_series: bool,
     tangents: bool,
     abrupt: bool,
     timed: bool,
 ) -> tuple[Any, Any]:
     """The pieces that the driver is handed first; what the run does not need is not loaded.
 
-    Whether some mode takes steps of the solver's method ``attempt``, some rate depends on time alone, some
-    guard is no series itself, the run has tangent vectors, some field may change abruptly below them, and
-    something in the system depends on time.
+    Whether some mode takes steps of the solver's method ``attempt``, some rate depends on time alone, the run
+    has tangent vectors, some field may change abruptly below them, and something in the system depends on
+    time.
     """
 
     def needed(asked: bool, load: Callable[[], Any]) -> Any:
@@ -220,10 +218,7 @@ def driver_parts(
         explained_step=needed(forced, lambda: forcing().explained_step),
         explained_attempt=needed(forced, lambda: forcing().explained_attempt),
         explained_series=needed(forced, lambda: forcing().explained_series),
-        crossing_beside_series=needed(
-            beside_series,
-            lambda: load_kernels("hybrid.kernels.steps.beside_series").crossing_beside_series,
-        ),
+        crossing_on_path=load_kernels("hybrid.kernels.guards.isolate").crossing_on_path,
     )
     return parts, attempts
 

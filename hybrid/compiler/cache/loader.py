@@ -43,6 +43,7 @@ IN_SECOND = (
     "hybrid.kernels.jumps.jump",
     "hybrid.kernels.jumps.corner",
     "hybrid.kernels.events.initial_mode",
+    "hybrid.kernels.guards.isolate",
     LIMITS,
 )
 # All kernels that Python calls or passes on, slowest to compile first.
@@ -55,7 +56,7 @@ ALL_KERNELS = (
     "hybrid.kernels.jumps.corner",
     "hybrid.kernels.events.bounds",
     "hybrid.kernels.steps.forcing",
-    "hybrid.kernels.steps.beside_series",
+    "hybrid.kernels.guards.isolate",
     "hybrid.kernels.arithmetic.tangent",
     "hybrid.kernels.steps.disguised_jumps",
     "hybrid.kernels.steps.late",

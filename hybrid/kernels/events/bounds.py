@@ -60,27 +60,28 @@ def _whole_line(row):
 
 
 @njit(**KERNEL)
-def _bound_state(path, column, middle, radius, row):
+def bound_state(path, column, middle, radius, row):
     """Bound a component of the path around ``middle`` by a parabola and its remainder.
 
     The remainder is at most ``radius**3`` times the sum of ``C(k, 3) |c_k| end**(k - 3)``.
     """
     end = middle + radius
     value, slope, bend = 0.0, 0.0, 0.0
-    size, third = 0.0, 0.0
+    size, steep, third = 0.0, 0.0, 0.0
     for k in range(path.degree, -1, -1):
         coefficient = path.powers[k, column]
         bend = bend * middle + slope
         slope = slope * middle + value
         value = value * middle + coefficient
         magnitude = abs(coefficient)
+        steep = steep * end + size
         size = size * end + magnitude
         if k > 2:
             third = third * end + magnitude * (k * (k - 1.0) * (k - 2.0) / 6.0)
     rounding = 4.0 * EPSILON * size
     row[LOW_MIDDLE], row[HIGH_MIDDLE] = value - rounding, value + rounding
     turn = 2.0 * abs(bend) * radius + 3.0 * third * radius * radius
-    turn += 4.0 * EPSILON * (abs(slope) + turn)
+    turn += 4.0 * EPSILON * (steep + turn)
     row[LEAST_SLOPE], row[MOST_SLOPE] = slope - turn, slope + turn
     rest = third * radius * radius * radius + rounding
     one, other = value + radius * (bend * radius - slope), value + radius * (bend * radius + slope)
@@ -96,7 +97,7 @@ def _bound_time(path, middle, radius, row):
     """Bound the time along the step."""
     start, pace = path.start, path.pace
     if path.clock >= 0:
-        _bound_state(path, path.clock, middle, radius, row)
+        bound_state(path, path.clock, middle, radius, row)
     else:
         value = pace * middle
         row[LOW], row[HIGH] = value - pace * radius, value + pace * radius
@@ -311,7 +312,7 @@ def bound_guard(programs, transition, path, middle, radius, registers):
         row = registers[place - first]
         code = programs.rows[place, 0]
         if code == op.STATE:
-            _bound_state(path, programs.rows[place, 1], middle, radius, row)
+            bound_state(path, programs.rows[place, 1], middle, radius, row)
         elif code == op.TIME:
             _bound_time(path, middle, radius, row)
         else:

@@ -13,7 +13,7 @@ and its level has reached the guard ``h`` there.
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import NO_ROOT, first_crossing
+from hybrid.kernels.arithmetic.bernstein import NO_ROOT
 from hybrid.kernels.events.guards import displace, error_band, guard_speed, guard_value, rounding_band
 from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION
@@ -55,20 +55,6 @@ def keep_change(run, transition, side):
     run.passed[transition] = NO_ROOT
     if side != before:
         run.rehearsal[3, transition] = before if before != 0 else NOT_KNOWN
-
-
-@njit(**KERNEL)
-def keep_passage(run, transition, direction, coefficients, degree, side, hidden, stack):
-    """Note where a polynomial on a step has changed sides before it crosses in its ``direction``, if it does.
-
-    It may have if it starts on the ``side`` to which it crosses; zero if that is not known. Its Bernstein
-    coefficients are those on the step beyond the share ``hidden``.
-    """
-    if direction == 0 or side == -direction:
-        return
-    theta, _ = first_crossing(coefficients, degree, side, -direction, stack)
-    if theta < NO_ROOT:
-        run.passed[transition] = hidden + theta * (1.0 - hidden)
 
 
 @njit(**INLINE)

@@ -17,7 +17,7 @@ from hybrid.kernels.events.guards import (
 from hybrid.kernels.events.path import state_at, time_at
 from hybrid.kernels.events.record import start_record
 from hybrid.kernels.events.resolution import restore_sides
-from hybrid.kernels.events.touches import note_touch, remember_touch, share_with_one_touch
+from hybrid.kernels.guards.touch import note_touch, remember_touch, share_with_one_touch
 from hybrid.kernels.steps.runge_kutta_guards import (
     NOT_THERE,
     earliest_crossing,
@@ -138,7 +138,7 @@ def find_event(task, h, interpolated):
     rounding of time allows: there the state has reached the guard, and a transition in that direction fires.
     Without one, or if it has just fired, the length is nan.
     """
-    _, model, method, run, _, work = task_of(task)
+    attempts, model, method, run, _, work = task_of(task)
     mode, t, path = run.mode, run.phase, path_of_step(method, run.phase, h, work)
     ignored, touched = NO_TRANSITION, 0.0
     for trial in range(2):
@@ -146,7 +146,9 @@ def find_event(task, h, interpolated):
             interpolation_stages(model, method, mode, t, h, run.y, work)
         if not all_affine(model, mode):
             interpolant_path(method, h, run.y, model.dimension, work)
-        theta, fired, proved, blurred = earliest_crossing(model, method, run, path, ignored, touched, work)
+        theta, fired, proved, blurred = earliest_crossing(
+            attempts, model, method, run, path, ignored, touched, work
+        )
         if blurred != NO_TRANSITION:
             reached, correction, first = reach_blurred(task, h, blurred)
             if reached != h:

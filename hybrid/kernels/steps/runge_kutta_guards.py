@@ -9,36 +9,29 @@ from hybrid.kernels.arithmetic.bernstein import (
     NO_ROOT,
     crosses_towards,
     divide_by_theta,
-    first_crossing,
     stays,
 )
 from hybrid.kernels.arithmetic.clock import measured_time
-from hybrid.kernels.events.crossings import crossing_on_path
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
     error_band,
     guard_speed,
     guard_value,
+    may_jump,
     rounding_band,
 )
-from hybrid.kernels.events.hidden import hidden_share
-from hybrid.kernels.events.onset import AT_REST, BY_SPEED, LATER, has_just_fired
+from hybrid.kernels.events.onset import BY_SPEED, LATER
 from hybrid.kernels.events.resolution import (
     MARGIN,
     field_holds,
     keep_outcome,
-    keep_passage,
     keep_side,
     keeps_sign,
     set_sides_before,
     underflows,
 )
-from hybrid.kernels.events.touches import (
-    forget_touches,
-    note_touch,
-    note_touches,
-    share_with_one_touch,
-)
+from hybrid.kernels.guards.pieces import NO_COLUMN
+from hybrid.kernels.guards.touch import forget_touches, note_touch, share_with_one_touch
 from hybrid.kernels.steps.step import attempt_again
 from hybrid.kernels.types.codes import NO_TRANSITION
 from hybrid.kernels.types.kinds import REAL, TRUTH
@@ -73,6 +66,19 @@ def affine_polynomial(model, method, transition, t, h, x, value, work):
             total += method.interpolant[i, j] * work.speeds[j]
         work.polynomial[i] = total
     return degree
+
+
+@njit(**KERNEL)
+def affine_powers(model, method, value, h, work):
+    """Powers of an affine guard on the interpolant behind those of the state, after ``affine_polynomial``."""
+    n, path = model.dimension, work.path
+    for k in range(method.powers.shape[0]):
+        total = 0.0
+        for j in range(method.a.shape[0]):
+            total += method.powers[k, j] * work.speeds[j]
+        path[k, n] = total
+    path[0, n] = value
+    path[1, n] += h * work.gradient[n]
 
 
 @njit(**KERNEL)
@@ -179,56 +185,42 @@ def largest_magnitude(coefficients, degree):
 
 
 @njit(**KERNEL)
-def crossing_of_affine(model, method, run, transition, path, end, work):
-    """Where an affine guard crosses on a step, and its side after.
+def stays_on_side(model, method, run, transition, path, work):
+    """Whether an affine guard surely has no zero on a step, or rests at zero, by its Bernstein coefficients.
 
-    Returned first is whether the guard may have left its side, and last whether the error of the step hides
-    that. ``end`` is the value at the end of the step of a guard that has not left zero by its speed.
+    Else the powers of its polynomial are left behind those of the state on the path.
     """
-    t, h, hidden = path.start, path.pace, 0.0
-    on_guard, side = run.on_guard[transition], run.side[transition]
+    t, h, on_guard = path.start, path.pace, run.on_guard[transition]
     start = 0.0 if on_guard > 0 else guard_value(model, transition, t, run.y, work.scalar)
     degree = affine_polynomial(model, method, transition, t, h, run.y, start, work)
-    error = error_band(method, run, work.gradient, model.dimension)
     if on_guard > 0:
         band = rounding_on_step(model, run, transition, t, h, work)
         if largest_magnitude(work.polynomial, degree) <= band:
-            return False, NO_ROOT, side, False
-        run.on_guard[transition] = 0
-        if on_guard >= LATER:
-            hidden = hidden_share(work.polynomial, degree, band, error, end, work.stack)
-            if on_guard == AT_REST and has_just_fired(run, transition, on_guard):
-                side = 0
-    known_roots = 1 if on_guard == BY_SPEED else 0
-    for _ in range(known_roots):
+            return True
+    if on_guard == BY_SPEED:
         degree = divide_by_theta(work.polynomial, degree)
-    if stays(work.polynomial, degree, side, error):
-        return False, NO_ROOT, side, False
-    unsure = asks_error(run, on_guard) and not outweighs_error(model, run, side * work.polynomial[0], h, work)
-    direction, before = model.direction[transition], side
-    theta, side = first_crossing(work.polynomial, degree, side, direction, work.stack)
-    if theta != NO_ROOT or side != before:
-        keep_passage(run, transition, direction, work.polynomial, degree, before, hidden, work.stack)
-    if on_guard >= LATER:
-        theta += hidden * (1.0 - theta) if 0.0 < theta < NO_ROOT else 0.0
-        degree = affine_polynomial(model, method, transition, t, h, run.y, 0.0, work)
-    note_touches(run, transition, degree, known_roots, hidden, theta, error, work)
-    return True, theta, side, unsure
+    error = error_band(method, run, work.gradient, model.dimension)
+    if on_guard < LATER and stays(work.polynomial, degree, run.side[transition], error):
+        run.on_guard[transition] = 0
+        return True
+    affine_powers(model, method, start, h, work)
+    return False
 
 
 @njit(**KERNEL)
-def crossing_on_step(model, method, run, transition, path, work):
+def crossing_on_step(attempts, model, method, run, transition, path, work):
     """Where a guard crosses, the share of the step that is proved, and whether the crossing is resolved."""
-    t, h, on_guard, share = path.start, path.pace, run.on_guard[transition], 1.0
-    end = guard_value(model, transition, t + h, work.new, work.scalar) if on_guard >= LATER else 0.0
+    t, h, on_guard, column = path.start, path.pace, run.on_guard[transition], NO_COLUMN
     if model.affine_guard[transition] == 1:
-        leaves, theta, side, unsure = crossing_of_affine(model, method, run, transition, path, end, work)
-        if not leaves:
+        if stays_on_side(model, method, run, transition, path, work):
             return NO_ROOT, 1.0, True
-    else:
-        known = asks_error(run, on_guard)
-        unsure = known and not leaves_as_known(model, run, transition, t, h, work)
-        theta, side, share = crossing_on_path(model, method, run, transition, path, end, work)
+        column = model.dimension
+    end = guard_value(model, transition, t + h, work.new, work.scalar) if on_guard >= LATER else 0.0
+    known = asks_error(run, on_guard)
+    unsure = known and not leaves_as_known(model, run, transition, t, h, work)
+    theta, share = attempts.crossing_on_path(model, method, run, transition, column, path, end, work)
+    side = run.rehearsal[3, transition]
+    run.rehearsal[3, transition] = 0
     if underflows(model, transition, t, run.y, t + h, work.new, work.scalar):
         return NO_ROOT, share, True
     hidden = unsure or (on_guard == 0 and not is_resolved(model, method, run, transition, t, h, work))
@@ -237,7 +229,7 @@ def crossing_on_step(model, method, run, transition, path, work):
 
 
 @njit(**INLINE)
-def earliest_crossing(model, method, run, path, ignored, touched, work):
+def earliest_crossing(attempts, model, method, run, path, ignored, touched, work):
     """Earliest crossing on the attempted step over the mode's guards but ``ignored``, and its transition.
 
     The guard of ``ignored`` touches zero at the share ``touched`` of the step. Returns
@@ -259,7 +251,7 @@ def earliest_crossing(model, method, run, path, ignored, touched, work):
             leave_guard(model, run, transition, path.start + path.pace, work)
             note_touch(run, transition, touched, 0.0)
             continue
-        theta, share, resolved = crossing_on_step(model, method, run, transition, path, work)
+        theta, share, resolved = crossing_on_step(attempts, model, method, run, transition, path, work)
         proved = min(proved, share)
         if not resolved:
             blurred = transition
@@ -342,6 +334,16 @@ def searched_at(bracket, begins, distance, h):
 
 
 @njit(**KERNEL)
+def turns_back(model, run, transition, side, t, s, work):
+    """Whether a guard that does not jump leads back to its side, where a step ends within its rounding."""
+    speed = guard_speed(model, transition, t, work.new, work.stages[s], work.gradient)
+    if not speed * side > 0.0 or may_jump(model, run, transition, t, work.new, work):
+        return False
+    value = guard_value(model, transition, t, work.new, work.scalar)
+    return abs(value) <= rounding_band(model, run, transition, t, work.new, work)
+
+
+@njit(**KERNEL)
 def land(task, transition, side, h, theta):
     """Shorten the step so that it ends on the guard, with the end in ``work.new``.
 
@@ -382,7 +384,7 @@ def land(task, transition, side, h, theta):
         if closed and high - low <= 2.0 * EPSILON * (max(high, rounding) if smooth else high):
             if length != high:
                 attempt_again(task, high)
-            return high, 0.0
+            return (NOT_THERE if turns_back(model, run, transition, side, t + high, s, work) else high), 0.0
         newton = length + correction
         slow = trial >= MOST_LANDINGS // 2 if smooth else trial > 2 and not abs(correction) <= 0.5 * last
         # A place that does not come from Newton's method gives no rate of convergence.

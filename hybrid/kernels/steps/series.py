@@ -10,19 +10,19 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import first_crossing
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.columns import evaluate, evaluate_with_sizes, gather_tangents
 from hybrid.kernels.arithmetic.powers import power_of_two
+from hybrid.kernels.events.bounds import bound_state
 from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced, sides_at
 from hybrid.kernels.events.moments import speed_rounding
 from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.events.path import state_at, time_at, up_to, value_at
 from hybrid.kernels.events.record import start_record
 from hybrid.kernels.events.resolution import restore_sides
-from hybrid.kernels.events.touches import remember_touch
+from hybrid.kernels.guards.touch import remember_touch
 from hybrid.kernels.instructions.registers import whole_registers
-from hybrid.kernels.steps.series_guards import earliest_on_series, powers_on_step, to_bernstein
+from hybrid.kernels.steps.series_guards import earliest_on_series
 from hybrid.kernels.steps.series_length import (
     EXACT_TOLERANCE,
     MOST_BITS,
@@ -41,14 +41,15 @@ from hybrid.kernels.types.codes import (
     FROM_STATE,
     FROM_ZERO,
     GO_ON,
+    HIGH,
     HIGHEST_ORDER,
+    LEAST_SLOPE,
     NARROW,
     NO_TRANSITION,
     NON_FINITE,
     READY,
     ROOTED,
     STEP_TOO_SMALL,
-    WIDE,
 )
 from hybrid.kernels.types.layout import EPSILON, Path
 from hybrid.kernels.types.options import INLINE, KERNEL
@@ -114,16 +115,21 @@ def followed(model, method, run, path, work):
 def step_until(path, remaining, work):
     """Shorten a step on the clock of a desingularised mode so that it does not pass the end of the run.
 
-    Beyond a zero of the root, where the mode ends, that clock would run backwards.
+    Beyond a zero of the root, where the mode ends, that clock would run backwards: the first place counts at
+    which it shows the end.
     """
     series, clock, order, h = path.powers, path.clock, path.degree, path.length
-    degree = powers_on_step(series, whole_registers(clock + 2, WIDE), order, h, 0, work.polynomial)
-    to_bernstein(work.polynomial, degree)
-    theta, _ = first_crossing(work.polynomial, degree, 1, -1, work.stack)
-    longest = min(theta, 1.0) * h
-    if value_at(series, clock, order, longest) < remaining:
-        return h
-    return time_of(series, clock, order, longest, remaining)
+    low, high, row = 0.0, h, work.registers[0]
+    while low < h:
+        bound_state(path, clock, 0.5 * (low + high), 0.5 * (high - low), row)
+        shown = value_at(series, clock, order, high) >= remaining
+        if shown and (row[LEAST_SLOPE] >= 0.0 or high - low <= 2.0 * EPSILON * high):
+            return time_of(series, clock, order, high, remaining)
+        if row[HIGH] < remaining or row[LEAST_SLOPE] >= 0.0 or high - low <= 2.0 * EPSILON * high:
+            low, high = high, min(high + 2.0 * (high - low), h)
+        else:
+            high = 0.5 * (low + high)
+    return h
 
 
 @njit(**INLINE)

@@ -6,44 +6,32 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import (
-    NO_ROOT,
-    bracket_crossing,
-    crosses_towards,
-    halve,
-    stays,
-)
+from hybrid.kernels.arithmetic.bernstein import NO_ROOT, crosses_towards, halve, stays
 from hybrid.kernels.arithmetic.lanes import four_times, load, store
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
     error_band,
+    guard_value,
     rounding_band,
     size_of_time,
 )
-from hybrid.kernels.events.hidden import hidden_share
-from hybrid.kernels.events.onset import AT_REST, LATER, has_just_fired
+from hybrid.kernels.events.onset import BY_SPEED, LATER
 from hybrid.kernels.events.path import time_at
 from hybrid.kernels.events.resolution import (
     MARGIN,
     UNDERFLOW,
     keep_outcome,
-    keep_passage,
     keep_side,
     keeps_sign,
     set_sides_before,
     underflows,
 )
-from hybrid.kernels.events.touches import forget_touches, note_touches, share_with_one_touch
+from hybrid.kernels.guards.isolate import guard_at_start
+from hybrid.kernels.guards.pieces import NO_COLUMN, Guard, as_column
+from hybrid.kernels.guards.touch import forget_touches, share_with_one_touch
 from hybrid.kernels.steps.series_roots import Bracket, root_between
-from hybrid.kernels.types.codes import (
-    DESINGULARISED,
-    EXACT,
-    HIGHEST_ORDER,
-    NARROW,
-    NO_TRANSITION,
-    ROOTED,
-)
-from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH
+from hybrid.kernels.types.codes import NARROW, NO_TRANSITION
+from hybrid.kernels.types.kinds import INTEGER, REAL
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -54,11 +42,6 @@ ROUNDING_OF_TERMS = 64.0 * EPSILON
 # High powers of a series are left out of a proof if their sum is below this share of the size of the guard.
 NEGLIGIBLE = 0.003
 
-
-# What a power of the variable is divided by in Bernstein form: ``C(degree, k)``.
-SHARES = np.array(
-    [[1.0 / max(math.comb(n, k), 1) for k in range(HIGHEST_ORDER + 1)] for n in range(HIGHEST_ORDER + 1)]
-)
 # What a power of the variable adds to each Bernstein coefficient: ``C(i, k) / C(degree, k)`` in the row
 # ``DEGREES * degree + k``.
 DEGREES = 4 * NARROW
@@ -75,29 +58,12 @@ CLEAR, CROSSES, UNKNOWN = range(3)
 SHORTEST_PART = 0.2
 
 
-@njit(**INLINE)
-def to_bernstein(coefficients, degree):
-    """Turn power coefficients on ``[0, 1]`` into Bernstein coefficients, in place."""
-    for k in range(1, degree + 1):
-        coefficients[k] *= SHARES[degree, k]
-    for level in range(degree):
-        # A view whose indices are never negative needs no check in the inner loop.
-        row = coefficients[level : degree + 1]
-        before = row[0]
-        for j in range(1, degree + 1 - level):
-            entry = row[j]
-            row[j] = entry + before
-            before = entry
-
-
 @njit(**KERNEL)
 def leading_to_bernstein(coefficients, degree, stack):
-    """As ``to_bernstein``, from ``coefficients`` into the first row of a stack, a column a register."""
-    if degree >= DEGREES:
-        for k in range(degree + 1):
-            stack[0, 2 + k] = coefficients[k]
-        to_bernstein(stack[0, 2:], degree)
-        return
+    """Bernstein coefficients from those of powers on ``[0, 1]`` into the first row of a stack.
+
+    One column a register; the degree is below ``DEGREES``.
+    """
     a, b, c, d = four_times(0.0), four_times(0.0), four_times(0.0), four_times(0.0)
     row = DEGREES * degree
     for k in range(degree + 1):
@@ -110,34 +76,6 @@ def leading_to_bernstein(coefficients, degree, stack):
     store(stack, 0, 2 + NARROW, b)
     store(stack, 0, 2 + 2 * NARROW, c)
     store(stack, 0, 2 + 3 * NARROW, d)
-
-
-@njit(**INLINE)
-def powers_on_step(series, column, order, h, known_roots, coefficients):
-    """Power coefficients on ``[0, 1]`` of a series, divided by its variable for each known root at 0.
-
-    Returns the degree.
-    """
-    degree = order
-    while degree > known_roots and series[degree, column] == 0.0:
-        degree -= 1
-    power = h**known_roots
-    for k in range(known_roots, degree + 1):
-        coefficients[k - known_roots] = series[k, column] * power
-        power *= h
-    return degree - known_roots
-
-
-@njit(**INLINE)
-def leading_power(series, column, order, h, known_roots, size):
-    """The lowest power of a series, not below ``known_roots``, that is more than rounding on the step ``h``.
-
-    ``size`` is the sum of the magnitudes of all terms.
-    """
-    power = h**known_roots
-    while known_roots < order and abs(series[known_roots, column]) * power <= ROUNDING_OF_TERMS * size:
-        known_roots, power = known_roots + 1, power * h
-    return known_roots
 
 
 @njit(**INLINE)
@@ -225,14 +163,6 @@ def judge_leading(degree, rest, slope_of_rest, side, band, last, stack):
 
 
 @njit(**INLINE)
-def as_root(model, mode, size):
-    """How large a guard of a size is in its series, which may be that of its root."""
-    if model.propagator[mode] not in (DESINGULARISED, ROOTED):
-        return size
-    return math.sqrt(size) if model.root[mode] == 2 else size ** (1.0 / model.root[mode])
-
-
-@njit(**INLINE)
 def last_terms(series, column, order, h):
     """The sum of the magnitudes of the last terms of a series: more than all that are left out."""
     power, total = h**order, 0.0
@@ -258,13 +188,14 @@ def underflows_on_series(series, column, order):
 def is_resolved_by_series(model, run, transition, column, path, on_guard, work):
     """Whether the end of the series leaves the sign of a guard at both ends of the step alone.
 
-    As ``runge_kutta_guards.is_resolved``. ``column`` is that of the guard, or -1 if the guard is no series.
+    As ``runge_kutta_guards.is_resolved``. ``column`` is that of the guard, or ``NO_COLUMN`` if the guard is
+    no series.
     """
     n, series, order, t, h = model.dimension, path.powers, path.degree, path.start, path.length
     if model.degree[run.mode] > 0 or on_guard > 0:
         # A polynomial has no other terms; the derivatives of a guard that is zero tell its side.
         return True
-    if column >= 0:
+    if column != NO_COLUMN:
         if 0.0 < abs(series[0, column]) < UNDERFLOW:
             # The last terms have no digits.
             return False
@@ -277,7 +208,8 @@ def is_resolved_by_series(model, run, transition, column, path, on_guard, work):
         for i in range(n):
             size += abs(work.gradient[i]) * max(abs(run.y[i]), abs(series[order + 1, i]))
         rounding = ROUNDING_OF_STATE * EPSILON * size
-        return error <= as_root(model, run.mode, rounding)
+        guard = Guard(transition, column, 0, on_guard, 0.0, 0.0, 0.0)
+        return error <= as_column(model, run, guard, rounding)
     for i in range(n):
         work.trial[i] = series[order + 1, i]
         size = max(abs(series[0, i]), abs(series[1, i] * h), abs(work.trial[i]))
@@ -289,76 +221,52 @@ def is_resolved_by_series(model, run, transition, column, path, on_guard, work):
     )
 
 
-@njit(**KERNEL)
-def crossing_beside(attempts, model, method, run, transition, path, work):
-    """Where a guard that is no series crosses, the share of the step that is proved, if it is resolved."""
-    on_guard, later = run.on_guard[transition], time_at(path, path.length)
-    for i in range(model.dimension):
-        work.trial[i] = path.powers[path.degree + 1, i]
-    theta, share = attempts.crossing_beside_series(model, method, run, transition, path, work)
-    side = run.rehearsal[3, transition]
-    run.rehearsal[3, transition] = 0
-    if underflows(model, transition, path.start, run.y, later, work.trial, work.scalar):
-        return NO_ROOT, share, True
-    resolved = is_resolved_by_series(model, run, transition, -1, path, on_guard, work)
-    keep_outcome(run, transition, theta, side)
-    return theta, share, resolved
+class Leading(NamedTuple):
+    """A guard that is a column of a series, as its leading powers are judged.
 
-
-class Sought(NamedTuple):
-    """A guard that is a series, and what its crossing on a step is sought with.
-
-    ``side`` is its sign before, zero if that is open, and ``on_guard`` its order at the start. So many roots
-    at zero are ``known``, where its first powers are not ``noisy``. Within ``rounding`` the guard is zero;
-    within ``band`` it may touch zero.
+    ``side`` is its sign before, and ``on_guard`` its order at the start: so many powers are ``known`` to be
+    zero. All the others come to ``size``; ``power`` is that of the step's length in the first of them. Within
+    ``band`` the guard may touch zero.
     """
 
     transition: INTEGER
     column: INTEGER
-    on_guard: INTEGER
     side: INTEGER
+    on_guard: INTEGER
     known: INTEGER
-    noisy: TRUTH
-    rounding: REAL
+    size: REAL
+    power: REAL
     band: REAL
 
 
-@njit(**KERNEL)
-def sought(model, method, run, transition, column, path, work):
-    """What the crossing of a guard that is a series is sought with."""
-    mode, on_guard, side = run.mode, run.on_guard[transition], run.side[transition]
-    kind = model.propagator[mode]
-    model.guard_gradient(transition, path.start, run.y, model.parameters, work.gradient)
-    rounding = rounding_band(model, run, transition, path.start, run.y, work)
-    band = rounding
-    if kind != EXACT:
-        band = error_band(method, run, work.gradient, model.dimension)
-    # A value that is small for a guard is less small for the root of the guard.
-    rounding, band = as_root(model, mode, rounding), as_root(model, mode, band)
-    # The root of a guard that is zero without speed begins to grow like its variable, too.
-    known = min(on_guard, 1)
-    noisy = on_guard >= LATER and kind != EXACT
-    if noisy:
-        # Where terms of the field cancel, the first powers are rounding.
-        known = 0
-    elif on_guard >= LATER:
-        size = path.powers[path.degree + 2, column]
-        known = leading_power(path.powers, column, path.degree, path.length, known, size)
-    if on_guard == AT_REST and has_just_fired(run, transition, on_guard):
-        side = 0
-    return Sought(transition, column, on_guard, side, known, noisy, rounding, band)
+@njit(**INLINE)
+def leading_of(model, method, run, guard, path, work):
+    """The ``Leading`` of a guard, and whether the guard rests at zero."""
+    transition, column, t = guard.transition, guard.column, path.start
+    model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
+    known = 1 if guard.on_guard == BY_SPEED else 0
+    size, power = beyond_known_roots(
+        path.powers, column, path.length, known, path.powers[path.degree + 2, column]
+    )
+    rests, band = False, 0.0
+    if path.exact or guard.on_guard > 0:
+        band = as_column(model, run, guard, rounding_band(model, run, transition, t, run.y, work))
+        rests = guard.on_guard > 0 and size <= band
+    if not path.exact:
+        band = as_column(model, run, guard, error_band(method, run, work.gradient, model.dimension))
+    return Leading(transition, column, guard.side, guard.on_guard, known, size, power, band), rests
 
 
 @njit(**KERNEL)
-def crossing_by_leading(model, run, guard, path, size, power, work):
-    """``crossing_in_series`` by the leading powers of a guard, with a verdict, which may be ``UNKNOWN``.
-
-    ``size`` is the sum of the magnitudes of the powers that are not known, ``power`` that of the step's
-    length in the first of them.
-    """
+def crossing_by_leading(model, run, guard, path, work):
+    """``crossing_on_series`` by the leading powers of a guard, with a verdict, which may be ``UNKNOWN``."""
     series, order, h, side = path.powers, path.degree, path.length, guard.side
     column, transition = guard.column, guard.transition
-    degree, rest = leading_powers(series, column, order, power, guard.known, size, work.polynomial, h)
+    degree, rest = leading_powers(
+        series, column, order, guard.power, guard.known, guard.size, work.polynomial, h
+    )
+    if degree >= DEGREES:
+        return UNKNOWN, NO_ROOT, True
     leading_to_bernstein(work.polynomial, degree, work.stack)
     verdict, start, end, row = judge_leading(
         degree, rest, order * rest, side, guard.band, series[order + 1, column], work.stack
@@ -378,53 +286,48 @@ def crossing_by_leading(model, run, guard, path, size, power, work):
 
 
 @njit(**KERNEL)
-def crossing_by_all(model, run, guard, path, work):
-    """``crossing_in_series`` by all powers of a guard."""
-    series, order, h, column = path.powers, path.degree, path.length, guard.column
-    transition, before, hidden = guard.transition, guard.side, 0.0
-    degree = powers_on_step(series, column, order, h, guard.known, work.polynomial)
-    to_bernstein(work.polynomial, degree)
-    if guard.noisy:
-        end = series[order + 1, column]
-        hidden = hidden_share(work.polynomial, degree, guard.rounding, guard.band, end, work.stack)
-    if stays(work.polynomial, degree, before, guard.band):
-        return NO_ROOT, True
-    direction = model.direction[transition]
-    theta, end, row, side = bracket_crossing(work.polynomial, degree, before, direction, work.stack)
-    if theta < end:
-        ends = work.stack[row, 2], work.stack[row, 2 + degree]
-        start, end = hidden + theta * (1.0 - hidden), hidden + end * (1.0 - hidden)
-        bracket = Bracket(start * h, end * h, *ends)
-        theta = root_between(path, column, guard.known, bracket, -side) / h
-    if theta != NO_ROOT or side != before:
-        keep_passage(run, transition, direction, work.polynomial, degree, before, hidden, work.stack)
-    if guard.noisy:
-        degree = powers_on_step(series, column, order, h, guard.known, work.polynomial)
-        to_bernstein(work.polynomial, degree)
-    note_touches(run, transition, degree, guard.known, hidden, theta, guard.band, work)
-    if underflows_on_series(series, column, order):
-        return NO_ROOT, True
-    resolved = is_resolved_by_series(model, run, transition, column, path, guard.on_guard, work)
+def crossing_by_pieces(attempts, model, method, run, transition, column, path, work):
+    """``crossing_on_series`` by the isolation of the guard on pieces of the path.
+
+    ``column`` is that of the guard, or ``NO_COLUMN`` if the guard is no series.
+    """
+    on_guard, later, order, end = run.on_guard[transition], time_at(path, path.length), path.degree, 0.0
+    for i in range(model.dimension):
+        work.trial[i] = path.powers[order + 1, i]
+    if on_guard >= LATER:
+        if column == NO_COLUMN:
+            end = guard_value(model, transition, later, work.trial, work.scalar)
+        else:
+            end = path.powers[order + 1, column]
+    theta, share = attempts.crossing_on_path(model, method, run, transition, column, path, end, work)
+    side = run.rehearsal[3, transition]
+    run.rehearsal[3, transition] = 0
+    if column == NO_COLUMN:
+        small = underflows(model, transition, path.start, run.y, later, work.trial, work.scalar)
+    else:
+        small = underflows_on_series(path.powers, column, order)
+    if small:
+        return NO_ROOT, share, True
+    resolved = is_resolved_by_series(model, run, transition, column, path, on_guard, work)
     keep_outcome(run, transition, theta, side)
-    return theta, resolved
+    return theta, share, resolved
 
 
 @njit(**KERNEL)
-def crossing_in_series(model, method, run, transition, column, path, work):
-    """Where a guard crosses that is a series itself, as a share of the step, and whether that is resolved."""
-    guard = sought(model, method, run, transition, column, path, work)
-    size = path.powers[path.degree + 2, column]
-    size, power = beyond_known_roots(path.powers, column, path.length, guard.known, size)
-    if guard.on_guard > 0:
-        if size <= guard.rounding:
-            return NO_ROOT, True
-        run.on_guard[transition] = 0
-    if not guard.noisy:
-        # The second cheap proof: the leading powers keep to their side, whatever the others do.
-        verdict, theta, resolved = crossing_by_leading(model, run, guard, path, size, power, work)
-        if verdict != UNKNOWN:
-            return theta, resolved
-    return crossing_by_all(model, run, guard, path, work)
+def crossing_on_series(attempts, model, method, run, transition, column, path, work):
+    """Where a guard crosses, the share of the step that is proved, and whether the crossing is resolved."""
+    if column != NO_COLUMN:
+        guard = guard_at_start(model, run, transition, column)
+        leading, rests = leading_of(model, method, run, guard, path, work)
+        if rests:
+            return NO_ROOT, 1.0, True
+        if guard.on_guard < LATER:
+            # The second cheap proof: the leading powers keep to their side, whatever the others do.
+            verdict, theta, resolved = crossing_by_leading(model, run, leading, path, work)
+            if verdict != UNKNOWN:
+                run.on_guard[transition] = 0
+                return theta, 1.0, resolved
+    return crossing_by_pieces(attempts, model, method, run, transition, column, path, work)
 
 
 @njit(**KERNEL)
@@ -441,17 +344,17 @@ def earliest_on_series(attempts, model, method, run, path, work):
     forget_touches(run)
     first = model.first_outgoing[mode]
     for slot in range(first, model.first_outgoing[mode + 1]):
-        transition = model.outgoing[slot]
+        transition, column = model.outgoing[slot], NO_COLUMN
         keep_side(run, transition)
-        if model.guard_in_series[transition] == 0:
-            theta, share, resolved = crossing_beside(attempts, model, method, run, transition, path, work)
-            proved = min(proved, share)
-        else:
+        if model.guard_in_series[transition] == 1:
             column, side = model.dimension + slot - first, run.side[transition]
             value, size = series[order + 1, column] * side, series[order + 2, column]
             if run.on_guard[transition] == 0 and keeps_half(series[0, column] * side, value, size):
                 continue
-            theta, resolved = crossing_in_series(model, method, run, transition, column, path, work)
+        theta, share, resolved = crossing_on_series(
+            attempts, model, method, run, transition, column, path, work
+        )
+        proved = min(proved, share)
         if not resolved:
             blurred = transition
         if theta < earliest:

@@ -5,23 +5,21 @@ from typing import NamedTuple
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import AT_END, SETTLED
 from hybrid.kernels.events.path import value_at
 from hybrid.kernels.types.kinds import REAL
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
-# Safety factor for the estimated error of the last step towards a root.
+# Safety factor for the estimated error of the last step towards a root, which leaves out higher derivatives.
 UNSEEN = 64.0
+# Below this share of a root a step of Newton's method is so short that the next one would be rounding.
+SETTLED = 1e-8
 # Most steps of Newton's method from a root without to one with what is zero at the start up to rounding.
 MOST_CORRECTIONS = 60
 
 
 class Bracket(NamedTuple):
-    """Two places of a step with one root between them, and the values there, up to a positive factor.
-
-    Where another root is at a place, its value is zero, or has any sign.
-    """
+    """Two places of a step with one root between them, and the values there, up to a positive factor."""
 
     low: REAL
     high: REAL
@@ -84,11 +82,10 @@ def time_of(series, clock, order, h, span):
 
 @njit(**KERNEL)
 def root_between(path, column, known_roots, bracket, side):
-    """The one root of a series in an open interval of the step; the sign before it is ``side``.
+    """The one root of a series in an interval where it is monotone; the sign before it is ``side``.
 
-    Another root may be at an end of the interval. The series is divided by its variable for each known root
-    at 0; in the end it is taken as it is, which at 0 is zero up to rounding only; but not to a root at 0,
-    where the step begins.
+    The series is divided by its variable for each known root at 0; in the end it is taken as it is, which at
+    0 is zero up to rounding only; but not to a root at 0, where the step begins.
     """
     s, h = simple_root_of(path, column, known_roots, bracket, side), path.length
     for _ in range(MOST_CORRECTIONS if known_roots > 0 else 0):
@@ -111,21 +108,13 @@ def simple_root_of(path, column, known_roots, bracket, side):
     """
     low, high, left, right = bracket
     s, last = low + (high - low) * (left / (left - right)), high - low
-    first, final = low + AT_END * last, high - AT_END * last
     if not low < s < high:
         s = 0.5 * (low + high)
     for _ in range(100):
         value, slope, bend = expanded_at(path.powers, column, known_roots, path.degree, s)
-        turned = slope * side > 0.0
-        if turned:
-            # Another root, at an end of the bracket up to rounding, attracts from here.
-            slope = 0.0
-        elif value == 0.0:
+        if value == 0.0:
             return s
-        if turned and not first < s < final:
-            # So close to that root, rounding may have made the sign of the value.
-            pass
-        elif (value > 0.0) == (side > 0):
+        if (value > 0.0) == (side > 0):
             low = s
         else:
             high = s

@@ -317,7 +317,8 @@ class Work(Structure):
     (n + 1,)``; ``scalar (1,)``; ``field, field_after, state, settled (n,)``; ``departure (n,)``, the state
     before the step; ``scale_before (n,)``, sizes of the state that the run goes back to;
     ``saltation, sizes (n, n)``; ``rounding (4, n)``, how far the rates move, and the place
-    where a guard's derivatives are asked for; ``path (d + 1, n)``, the powers of the step's interpolant;
+    where a guard's derivatives are asked for; ``path (d + 1, n + 1)``, the powers of the step's interpolant
+    and of a guard on it;
     ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for its isolation; ``registers (r, 6)``,
     what is known of each row of a program, and ``samples (nodes + 1, 2 r)`` the ranges of these rows at the
     nodes of a step and what they have in common; ``places (nodes + m, n + 1)``,
@@ -404,14 +405,14 @@ class Attempts(Structure):
 
     ``attempt_implicit`` is the step of an implicit method; ``explained_step``, ``explained_attempt`` and
     ``explained_series`` shorten a step so that no pulse of the field is hidden from it;
-    ``crossing_beside_series`` finds the crossing of a guard that is no series itself.
+    ``crossing_on_path`` finds the crossing of a guard that no cheap proof decides.
     """
 
     attempt_implicit: function(REAL, Model, Method, INTEGER, REAL, REAL, VECTOR, INTEGER, Work)
     explained_step: function(REAL, Model, Method, Run, REAL, Work)
     explained_attempt: function(REAL, Model, Method, Run, REAL, Work)
     explained_series: function(REAL, Model, Method, Run, INTEGER, Path, Work)
-    crossing_beside_series: function(Pair(REAL), Model, Method, Run, INTEGER, Path, Work)
+    crossing_on_path: function(Pair(REAL), Model, Method, Run, INTEGER, INTEGER, Path, REAL, Work)
 
 
 class Task(Structure):

@@ -3,13 +3,11 @@
 from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import crosses_towards
-from hybrid.kernels.events.hidden import sample
 from hybrid.kernels.events.onset import AT_REST, LATER, has_just_fired
+from hybrid.kernels.guards.pieces import NOWHERE, sample
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
-# Returned instead of a place on the step if there is none.
-NOWHERE = -1.0
 # A guard that is zero at the start of the step is searched from this share of the step on.
 SETTLED = 64.0 * EPSILON
 # Number of parts of a step; a guard that could not be traced is evaluated at their ends.
@@ -17,10 +15,10 @@ SAMPLES = 32
 
 
 @njit(**KERNEL)
-def sampled_change(model, run, transition, path, begin, work):
+def sampled_change(model, run, path, guard, hidden, work):
     """As ``first_change``, for a guard that could not be traced: it is evaluated at some places only."""
     run.unproved += 1
-    side, on_guard, hidden = begin
+    transition, side, on_guard = guard.transition, guard.side, guard.on_guard
     direction, length, low = model.direction[transition], path.length, hidden
     for i in range(1, SAMPLES + 1):
         high = hidden + (length - hidden) * i / SAMPLES
