@@ -20,6 +20,7 @@ from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
     guard_speed,
     guard_value,
+    may_jump,
     rounding_band,
     size_of_time,
     slopes_at_guard,
@@ -105,16 +106,20 @@ def move_for(model, mode, t, x, moment, out, work):
 
 
 @njit(**KERNEL)
-def is_certain(model, transition, place, speed, drift, moment, work):
-    """Whether the ``speed`` of a guard has its sign for all that rounding may have made of the state.
+def is_certain(model, run, transition, place, speed, drift, moment, work):
+    """Whether the ``speed`` of a guard tells its side for all that rounding may have made of the state.
 
-    It must exceed its rounding ``drift``. That of a bent guard, which may turn, must do so a ``moment`` of
-    rounding before and after the place, too. ``work.field`` is current.
+    The speed must exceed its rounding ``drift``. A bent guard may turn: its speed must have the same sign a
+    ``moment`` of rounding before and after the place. Or it may jump. ``work.field`` is current.
     """
     _, t, x = place
     if not drift < abs(speed) < math.inf:
         return False
-    for part in range(0 if model.affine_guard[transition] == 1 else 2):
+    if model.affine_guard[transition] == 1:
+        return True
+    if may_jump(model, run, transition, t, x, work):
+        return False
+    for part in range(2):
         way = moment if part == 0 else -moment
         for i in range(model.dimension):
             work.settled[i] = x[i] + way * work.field[i]
@@ -135,7 +140,7 @@ def sign_along(model, run, transition, place, way, work):
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
     drift = speed_rounding(model, run, transition, mode, t, x, work)
     moment = LONGER * moment_of_rounding(model, run, t, work)
-    if is_certain(model, transition, place, speed, drift, moment, work):
+    if is_certain(model, run, transition, place, speed, drift, moment, work):
         return (1 if speed * way > 0.0 else -1), moment, True
     longest = LONGEST * unit_of_time(model, run, work)
     if not drift < math.inf:
