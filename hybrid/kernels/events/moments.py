@@ -33,6 +33,9 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 SHARE = ROUNDING_OF_STATE * EPSILON
 # Each moment is so many times as long as the last.
 LONGER = 16.0
+# A guard leaves zero by its speed if that keeps this share of itself until the guard is out of its rounding:
+# at a steady acceleration, what it takes to get there.
+KEPT = 0.5
 # The longest moment, in units of the time in which the state changes by its size.
 LONGEST = EPSILON**0.2
 
@@ -47,12 +50,17 @@ class Place(NamedTuple):
 
 @njit(**INLINE)
 def unit_of_time(model, run, work):
-    """The time in which the state changes by its size; 0 for a state at rest. ``work.field`` is current."""
+    """The time in which the state changes by its size, or all of the run if it is at rest or zero.
+
+    ``work.field`` is current.
+    """
     size, pace = 0.0, 0.0
     for i in range(model.dimension):
         if work.field[i] != 0.0:
             size, pace = max(size, run.scale[i]), max(pace, abs(work.field[i]))
-    return size / pace if pace > 0.0 else 0.0
+    if size * pace > 0.0:
+        return size / pace
+    return run.horizon if run.horizon < math.inf else 0.0
 
 
 @njit(**INLINE)
@@ -106,27 +114,23 @@ def move_for(model, mode, t, x, moment, out, work):
 
 
 @njit(**KERNEL)
-def is_certain(model, run, transition, place, speed, drift, moment, work):
-    """Whether the ``speed`` of a guard tells its side for all that rounding may have made of the state.
+def leaves_by_speed(model, run, transition, place, way, speed, drift, work):
+    """Whether the ``speed`` of a guard takes it out of its rounding.
 
-    The speed must exceed its rounding ``drift``. A bent guard may turn: its speed must have the same sign a
-    ``moment`` of rounding before and after the place. Or it may jump. ``work.field`` is current.
+    The speed must exceed its own rounding ``drift``, and keep half of itself for as long as the guard needs
+    at that speed. A guard may jump instead. ``way`` is that of :func:`sign_along`, ``work.field`` and
+    ``work.gradient`` are current.
     """
-    _, t, x = place
-    if not drift < abs(speed) < math.inf:
+    mode, t, x = place
+    if not drift < abs(speed) < math.inf or may_jump(model, run, transition, t, x, work):
         return False
-    if model.affine_guard[transition] == 1:
-        return True
-    if may_jump(model, run, transition, t, x, work):
-        return False
-    for part in range(2):
-        way = moment if part == 0 else -moment
-        for i in range(model.dimension):
-            work.settled[i] = x[i] + way * work.field[i]
-        there = guard_speed(model, transition, t + way, work.settled, work.field, work.gradient)
-        if not there * speed > 0.0:
-            return False
-    return True
+    band = rounding_band(model, run, transition, t, x, work)
+    moment = way * max(band / abs(speed), moment_of_rounding(model, run, t, work))
+    for i in range(model.dimension):
+        work.settled[i] = x[i] + moment * work.field[i]
+    model.field(mode, t + moment, work.settled, model.parameters, work.field_after)
+    there = guard_speed(model, transition, t + moment, work.settled, work.field_after, work.gradient)
+    return there * speed > KEPT * speed * speed
 
 
 @njit(**KERNEL)
@@ -140,7 +144,7 @@ def sign_along(model, run, transition, place, way, work):
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
     drift = speed_rounding(model, run, transition, mode, t, x, work)
     moment = LONGER * moment_of_rounding(model, run, t, work)
-    if is_certain(model, run, transition, place, speed, drift, moment, work):
+    if leaves_by_speed(model, run, transition, place, way, speed, drift, work):
         return (1 if speed * way > 0.0 else -1), moment, True
     longest = LONGEST * unit_of_time(model, run, work)
     if not drift < math.inf:

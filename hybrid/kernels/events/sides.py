@@ -14,8 +14,9 @@ from hybrid.kernels.events.guards import (
     rounding_band,
     was_left_behind,
 )
-from hybrid.kernels.events.moments import Place, move_for, sign_along
+from hybrid.kernels.events.moments import Place, move_for, sign_along, speed_rounding
 from hybrid.kernels.events.onset import AT_REST, BY_SPEED, LATER
+from hybrid.kernels.events.surface import finds_surface
 from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION, RESTING
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -151,13 +152,27 @@ def is_held(model, run, place, transition, towards, work):
         return False
     later, end = work.settled, t + 2.0 * moment
     move_for(model, mode, t, x, 2.0 * moment, later, work)
-    model.field(mode, end, later, model.parameters, work.field_after)
-    speed = guard_speed(model, transition, end, later, work.field_after, work.gradient)
+    model.field(mode, end, later, model.parameters, work.field)
+    speed = guard_speed(model, transition, end, later, work.field, work.gradient) * towards
+    way = float(towards)
+    if finds_surface(model, transition, end, later, speed, work):
+        speed, way = 1.0, 1.0
     model.reset(transition, end, later, model.parameters, work.state)
     model.field(mode, end, work.state, model.parameters, work.field_after)
-    kept = guard_speed(model, transition, end, work.state, work.field_after, work.gradient)
+    kept = work.gradient[model.dimension]
+    for i in range(model.dimension):
+        kept += work.gradient[i] * work.field_after[i]
+    model.field(mode, t, x, model.parameters, work.field)
     # Without products of speeds, which may be too small for a number.
-    return speed * towards > 0.0 and not kept * towards > KEPT * abs(speed)
+    return speed > 0.0 and not kept * way > KEPT * speed
+
+
+@njit(**KERNEL)
+def crosses_slowly(model, run, place, transition, work):
+    """Whether the jump that led here has crossed its guard with no more speed than rounding makes."""
+    mode, t, x = place
+    guard_speed(model, transition, t, x, work.field, work.gradient)
+    return abs(run.last_transversality) <= speed_rounding(model, run, transition, mode, t, x, work)
 
 
 @njit(**KERNEL)
@@ -203,7 +218,7 @@ def take_side(model, run, place, transition, arrival, known_sides, work):
     now, order = side_here(model, run, place, transition, came, before, own or not known, work)
     if own and order == AT_REST and direction != 0:
         # Its own reset has stopped the state on the guard, as a plastic impact does.
-        now = -direction
+        now = before.side if crosses_slowly(model, run, place, transition, work) else -direction
     due, rests = known_sides.due[transition] == 1, False
     if came == STARTED:
         crossed = order > 0 and direction != 0 and now == direction

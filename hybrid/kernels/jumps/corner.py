@@ -155,12 +155,13 @@ def turns_back(model, run, transition, before, work):
     """Whether the flow only touches a guard that it has reached: soon it is back on the side ``before``.
 
     The sides have just been taken. At the bottom of a dip that is no deeper than rounding either end may be
-    found first. If the field leads to the guard from both sides, the state comes to rest there.
+    found first. If the speed leads back, and the field leads to the guard from both sides, the state comes to
+    rest there.
     """
-    if run.on_guard[transition] not in (BY_SPEED, LATER) or run.side[transition] != before:
+    order, mode = run.on_guard[transition], run.mode
+    if run.side[transition] != before or order not in (BY_SPEED, LATER):
         return False
-    mode, t = run.mode, run.phase
-    return not leads_to_guard(model, run, transition, mode, t, run.y, before, work)
+    return order == LATER or not leads_to_guard(model, run, transition, mode, run.phase, run.y, before, work)
 
 
 @njit(**KERNEL)
@@ -175,12 +176,9 @@ def recall_sides(model, run):
 
 @njit(**KERNEL)
 def has_only_touched(model, run, record, fired, side, work):
-    """Whether the flow has only touched the guard of ``fired``, with the ``side`` beyond it; then a grazing.
-
-    For a guard that is not affine, the change of sign is proved.
-    """
+    """Whether the flow has only touched a guard, with the ``side`` beyond it; then a grazing is kept."""
     t = run.phase
-    if model.affine_guard[fired] == 0 or not turns_back(model, run, fired, -side, work):
+    if not turns_back(model, run, fired, -side, work):
         return False
     if not allowed(model, fired, t, run.y, work.scalar):
         return False
@@ -237,7 +235,9 @@ def first_in_order(task, fired, stop_cycle, stop_phase):
         if run.due[other] == 1 and other != fired:
             land_beyond(model, run, other, run.side[other], stop_cycle, stop_phase, work)
     chosen = first_due(model, run, work)
-    if touched or chosen == NO_TRANSITION:
+    if touched:
+        run.side[fired] = -beyond
+    elif chosen == NO_TRANSITION:
         run.side[fired] = 0
     if chosen == NO_TRANSITION:
         for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):

@@ -73,11 +73,11 @@ class TestTouches:
     def test_below_the_guard_each_crossing_fires_once(self, c, guard, direction):
         arc = run(-c, guard, direction)
         expected = 2 if direction == 0 else 1
-        if c >= 1e-14:
+        if c >= 1e-13:
             assert len(arc.jumps) == expected
         else:
-            # The depth is about the rounding of 1 - c.
-            assert arc.x[-1, 2] == len(arc.jumps) <= 2
+            # The depth is about the rounding of a state whose terms come to 4.
+            assert arc.x[-1, 2] == len(arc.jumps) in (0, expected)
             assert len(arc.jumps) + len(arc.grazings) > 0
         if c >= 1e-9:
             exact = [1 - np.sqrt(c), 1 + np.sqrt(c)]
