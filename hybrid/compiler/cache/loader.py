@@ -77,7 +77,7 @@ MESSAGE = "hybrid: compiling the kernels, once for all models (under a minute) .
 
 # Threads that need the same kernels compile and load them once: what a second load replaces would be freed
 # while it runs.
-_COMPILING = threading.RLock()
+_LOADING = threading.RLock()
 _LOADED: dict[str, SimpleNamespace] = {}
 
 
@@ -86,23 +86,27 @@ def load_kernels(module: str = DRIVER) -> SimpleNamespace:
 
     A line on standard error announces the compilation, once per process.
     """
-    if module in _LOADED:
-        return _LOADED[module]
-    with _COMPILING:
-        if module in _LOADED:
-            return _LOADED[module]
-        content = _on_disk(module)
-        if content is None:
-            with announced(MESSAGE):
-                if module == DRIVER:
-                    second_process.start([each for each in IN_SECOND if not is_kept(each)])
-                elif module in IN_SECOND:
-                    second_process.wait_for(lambda: is_kept(module))
-                    content = _on_disk(module)
-                if content is None:
-                    content = compiled(module)
-                    keep(_path(module), content)
-        return _LOADED.setdefault(module, SimpleNamespace(**kernels_in(content)))
+    if module not in _LOADED:
+        with _LOADING:
+            if module not in _LOADED:
+                _LOADED[module] = loaded(module)
+    return _LOADED[module]
+
+
+def loaded(module: str) -> SimpleNamespace:
+    """As ``load_kernels``, for a module that this process has not loaded, or loads anew."""
+    content = _on_disk(module)
+    if content is None:
+        with announced(MESSAGE):
+            if module == DRIVER:
+                second_process.start([each for each in IN_SECOND if not is_kept(each)])
+            elif module in IN_SECOND:
+                second_process.wait_for(lambda: is_kept(module))
+                content = _on_disk(module)
+            if content is None:
+                content = compiled(module)
+                keep(_path(module), content)
+    return SimpleNamespace(**kernels_in(content))
 
 
 def compiled(module: str) -> bytes:

@@ -8,7 +8,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import crosses_towards
-from hybrid.kernels.arithmetic.clock import forward
+from hybrid.kernels.arithmetic.clock import forward, measured_time
 from hybrid.kernels.arithmetic.slopes import spread_of_rate
 from hybrid.kernels.events.guards import (
     guard_speed,
@@ -78,7 +78,9 @@ def known_limit(model, method, run, transition, work):
     if turn == 0:
         return series
     # In the next round landings are slower, so that rounding moves them by more.
-    landing, next_round = rounding_of_landing(model, run, work), series.ratio**2 * series.latest
+    # The length of a flight keeps the digits that a late time has lost; that of a round does not.
+    time = measured_time(model, run, run.mode) if impacts else abs(run.phase)
+    landing, next_round = rounding_of_landing(model, run, time, work), series.ratio**2 * series.latest
     closer = misfit <= series.ratio ** (1.0 / turn) * misfit_before and landing < next_round
     hidden = 0.0 if closer else min(landing / (1.0 - series.ratio) ** 2, series.latest)
     lasted = time_before(model, run, 0, min(series.jumps, run.visits.shape[0]) - 1)

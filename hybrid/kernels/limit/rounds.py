@@ -128,12 +128,12 @@ def sizes_of_visits(model, run, seen, out):
 
 
 @njit(**KERNEL)
-def rounding_of_landing(model, run, work):
-    """How far rounding may move the time of the last jump: that of the time, and that of its guard."""
+def rounding_of_landing(model, run, time, work):
+    """How far rounding may move the time of the last jump: that of this ``time``, and that of its guard."""
     fired = run.last_fired
     model.guard_gradient(fired, run.phase, run.y, model.parameters, work.gradient)
     band = rounding_band(model, run, fired, run.phase, run.y, work)
-    return EPSILON * abs(run.phase) + band / abs(run.last_transversality)
+    return EPSILON * time + band / abs(run.last_transversality)
 
 
 @njit(**KERNEL)
