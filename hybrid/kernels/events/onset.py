@@ -36,12 +36,6 @@ def known_part(value, slope, on_guard):
 
 
 @njit(**INLINE)
-def side_is_certain(on_guard, least_slope, most_slope):
-    """Whether a guard that is zero is certain to leave to the known side: not if it has a kink there."""
-    return on_guard == BY_SPEED and not least_slope < 0.0 < most_slope
-
-
-@njit(**INLINE)
 def has_just_fired(run, transition, on_guard):
     """Whether the state is on a guard whose transition has just fired, with no time passed since."""
     return on_guard > 0 and run.last_fired == transition and run.since_entry == 0.0

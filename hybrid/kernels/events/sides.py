@@ -14,7 +14,13 @@ from hybrid.kernels.events.guards import (
     rounding_band,
     was_left_behind,
 )
-from hybrid.kernels.events.moments import Place, move_for, sign_along, speed_rounding
+from hybrid.kernels.events.moments import (
+    Place,
+    moment_of_rounding,
+    move_for,
+    sign_along,
+    speed_rounding,
+)
 from hybrid.kernels.events.onset import AT_REST, BY_SPEED, LATER
 from hybrid.kernels.events.surface import finds_surface
 from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION, RESTING
@@ -24,6 +30,8 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 STARTED, FLOWED, LANDED = range(3)
 # A reset that keeps less than this share of a guard's speed holds a state that the flow pushes through it.
 KEPT = 1e-3
+# A landing may lie so many moments of rounding beyond its guard (``landing``).
+LANDED_BY = 4096.0
 
 
 class Arrival(NamedTuple):
@@ -189,6 +197,15 @@ def side_here(model, run, place, transition, came, before, own, work):
 
 
 @njit(**KERNEL)
+def is_back_soon(model, run, place, transition, now, work):
+    """Whether the flow takes a guard from the side ``now`` to the other within the rounding of a landing."""
+    mode, t, x = place
+    moment = LANDED_BY * moment_of_rounding(model, run, t, work)
+    move_for(model, mode, t, x, moment, work.settled, work)
+    return guard_value(model, transition, t + moment, work.settled, work.scalar) * now < 0.0
+
+
+@njit(**KERNEL)
 def crossed_by_flow(model, run, place, transition, before, now, order, work):
     """Whether the flow has taken a guard across zero here; with how it has left zero.
 
@@ -216,6 +233,9 @@ def take_side(model, run, place, transition, arrival, known_sides, work):
     before = Before(known_sides.side[transition], known_sides.zero[transition]) if known else Before(0, 0)
     own = came == LANDED and left == mode and transition == fired
     now, order = side_here(model, run, place, transition, came, before, own or not known, work)
+    if own and order == 0 and is_back_soon(model, run, place, transition, now, work):
+        # Off the guard, where it has left the state, the reset's own guard has not been reached again.
+        now, order = -now, LATER
     if own and order == AT_REST and direction != 0:
         # Its own reset has stopped the state on the guard, as a plastic impact does.
         now = before.side if crosses_slowly(model, run, place, transition, work) else -direction

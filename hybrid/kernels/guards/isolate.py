@@ -26,7 +26,6 @@ from hybrid.kernels.events.onset import (
     LATER,
     has_just_fired,
     known_part,
-    side_is_certain,
 )
 from hybrid.kernels.events.path import pace_at_start, rounding_of_start, state_at, time_at
 from hybrid.kernels.guards.hidden import hidden_until
@@ -127,7 +126,7 @@ def _known_at_start(model, path, guard, hidden, work):
         at = bounds_at(model, path, guard, 0.0, work)
         least, most = at.least_slope, at.most_slope
         base, tilt = known_part(middle_of(at), 0.5 * (least + most), on_guard)
-        leaves = side_is_certain(on_guard, least, most)
+        leaves = on_guard == BY_SPEED
     return Guard(guard.transition, guard.column, guard.side, on_guard, sure, base, tilt), leaves
 
 
