@@ -50,7 +50,7 @@ class Place(NamedTuple):
 
 @njit(**INLINE)
 def unit_of_time(model, run, work):
-    """The time in which the state changes by its size, or all of the run if it is at rest or zero.
+    """The time in which the state changes by its size, and no more than the run takes, if that is known.
 
     ``work.field`` is current.
     """
@@ -58,9 +58,10 @@ def unit_of_time(model, run, work):
     for i in range(model.dimension):
         if work.field[i] != 0.0:
             size, pace = max(size, run.scale[i]), max(pace, abs(work.field[i]))
-    if size * pace > 0.0:
-        return size / pace
-    return run.horizon if run.horizon < math.inf else 0.0
+    longest = run.horizon if run.horizon < math.inf else 0.0
+    if not size * pace > 0.0:
+        return longest
+    return min(size / pace, longest) if longest > 0.0 else size / pace
 
 
 @njit(**INLINE)
