@@ -188,7 +188,7 @@ def side_here(model, run, place, transition, came, before, own, work):
     """``side_of`` a guard, where one that a coarser rounding let fire early is not taken for crossed."""
     _, t, x = place
     now, order = side_of(model, run, place, transition, came, before, work)
-    if came != STARTED and not own and order == 0 and before.side == -now:
+    if not own and order == 0 and before.side == -now:
         speed = guard_speed(model, transition, t, x, work.field, work.gradient)
         if was_left_behind(model, run, transition, t, x, speed, before.side, work):
             # It has fired within a coarser rounding of this place, and only now reaches its guard.
@@ -232,7 +232,7 @@ def take_side(model, run, place, transition, arrival, known_sides, work):
         known = inherit(model, left, transition, known_sides)
     before = Before(known_sides.side[transition], known_sides.zero[transition]) if known else Before(0, 0)
     own = came == LANDED and left == mode and transition == fired
-    now, order = side_here(model, run, place, transition, came, before, own or not known, work)
+    now, order = side_here(model, run, place, transition, came, before, own, work)
     if own and order == 0 and is_back_soon(model, run, place, transition, now, work):
         # Off the guard, where it has left the state, the reset's own guard has not been reached again.
         now, order = -now, LATER

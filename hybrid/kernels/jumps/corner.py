@@ -98,7 +98,7 @@ def arrived(task):
         if underflows(model, transition, t, run.y, t, run.y, work.scalar):
             continue
         place = Place(mode, t, run.y)
-        now, _ = side_here(model, run, place, transition, FLOWED, Before(before, 0), False, work)
+        now, _ = side_here(model, run, place, transition, STARTED, Before(before, 0), False, work)
         crossed = now == -before and crosses_towards(model.direction[transition], now)
         if crossed and allowed(model, transition, t, run.y, work.scalar):
             found = transition
