@@ -7,7 +7,8 @@ by its acceleration or by a higher derivative, at a kink, and where the guard ju
 
 The moments grow from the rounding of the time. Each is one step of the classical Runge-Kutta method, whose
 error goes with the fifth power of the step. Up to the fifth root of rounding, in units of the time in which
-the state changes by its size, that error is less than rounding. A guard that is still hidden then is at rest.
+the state changes by its size or a feedback acts, that error is less than rounding. A guard that is still
+hidden then is at rest.
 """
 
 import math
@@ -21,6 +22,7 @@ from hybrid.kernels.events.guards import (
     guard_speed,
     guard_value,
     may_jump,
+    pace_of_feedback,
     rounding_band,
     size_of_time,
     slopes_at_guard,
@@ -36,7 +38,7 @@ LONGER = 16.0
 # A guard leaves zero by its speed if that keeps this share of itself until the guard is out of its rounding:
 # at a steady acceleration, what it takes to get there.
 KEPT = 0.5
-# The longest moment, in units of the time in which the state changes by its size.
+# The longest moment, in units of the time in which the state changes by its size or a feedback acts.
 LONGEST = EPSILON**0.2
 
 
@@ -147,7 +149,9 @@ def sign_along(model, run, transition, place, way, work):
     moment = LONGER * moment_of_rounding(model, run, t, work)
     if leaves_by_speed(model, run, transition, place, way, speed, drift, work):
         return (1 if speed * way > 0.0 else -1), moment, True
-    longest = LONGEST * unit_of_time(model, run, work)
+    model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
+    longest, feedback = unit_of_time(model, run, work), pace_of_feedback(model, mode, work.jacobian)
+    longest = LONGEST * (min(longest, 1.0 / feedback) if feedback > 0.0 else longest)
     if not drift < math.inf:
         drift = 0.0
     while moment <= longest:
