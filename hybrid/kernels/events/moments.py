@@ -117,15 +117,21 @@ def move_for(model, mode, t, x, moment, out, work):
 
 
 @njit(**KERNEL)
-def leaves_by_speed(model, run, transition, place, way, speed, drift, work):
-    """Whether the ``speed`` of a guard takes it out of its rounding.
+def moves(model, run, transition, place, speed, drift, work):
+    """Whether a guard has a ``speed`` that exceeds its own rounding ``drift``, and does not jump instead."""
+    _, t, x = place
+    return drift < abs(speed) < math.inf and not may_jump(model, run, transition, t, x, work)
 
-    The speed must exceed its own rounding ``drift``, and keep half of itself for as long as the guard needs
-    at that speed. A guard may jump instead. ``way`` is that of :func:`sign_along`, ``work.field`` and
-    ``work.gradient`` are current.
+
+@njit(**KERNEL)
+def leaves_by_speed(model, run, transition, place, way, speed, drift, work):
+    """Whether the ``speed`` of a guard that moves takes it out of its rounding.
+
+    The speed must keep half of itself for as long as the guard needs at that speed. ``way`` is that of
+    :func:`sign_along`, ``work.field`` and ``work.gradient`` are current.
     """
     mode, t, x = place
-    if not drift < abs(speed) < math.inf or may_jump(model, run, transition, t, x, work):
+    if not moves(model, run, transition, place, speed, drift, work):
         return False
     band = rounding_band(model, run, transition, t, x, work)
     moment = way * max(band / abs(speed), moment_of_rounding(model, run, t, work))

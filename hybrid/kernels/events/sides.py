@@ -18,6 +18,7 @@ from hybrid.kernels.events.moments import (
     Place,
     moment_of_rounding,
     move_for,
+    moves,
     sign_along,
     speed_rounding,
 )
@@ -236,9 +237,16 @@ def take_side(model, run, place, transition, arrival, known_sides, work):
     if own and order == 0 and is_back_soon(model, run, place, transition, now, work):
         # Off the guard, where it has left the state, the reset's own guard has not been reached again.
         now, order = -now, LATER
+    if own and order in (LATER, AT_REST):
+        speed = guard_speed(model, transition, t, x, work.field, work.gradient)
+        drift = speed_rounding(model, run, transition, mode, t, x, work)
+        if moves(model, run, transition, place, speed, drift, work):
+            # Its own reset has begun a flight, even if that is lower or shorter than rounding.
+            now, order = 1 if speed > 0.0 else -1, BY_SPEED
     if own and order == AT_REST and direction != 0:
         # Its own reset has stopped the state on the guard, as a plastic impact does.
-        now = before.side if crosses_slowly(model, run, place, transition, work) else -direction
+        passes = before.order > 0 and crosses_slowly(model, run, place, transition, work)
+        now = before.side if passes else -direction
     due, rests = known_sides.due[transition] == 1, False
     if came == STARTED:
         crossed = order > 0 and direction != 0 and now == direction
