@@ -160,7 +160,7 @@ def sign_along(model, run, transition, place, way, work):
     longest = LONGEST * (min(longest, 1.0 / feedback) if feedback > 0.0 else longest)
     if not drift < math.inf:
         drift = 0.0
-    while moment <= longest:
+    while 0.0 < moment <= longest:
         later = t + way * moment
         move_for(model, mode, t, x, way * moment, work.settled, work)
         value = guard_value(model, transition, later, work.settled, work.scalar)
