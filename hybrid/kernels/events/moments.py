@@ -124,17 +124,9 @@ def moves(model, run, transition, place, speed, drift, work):
 
 
 @njit(**KERNEL)
-def leaves_by_speed(model, run, transition, place, way, speed, drift, work):
-    """Whether the ``speed`` of a guard that moves takes it out of its rounding.
-
-    The speed must keep half of itself for as long as the guard needs at that speed. ``way`` is that of
-    :func:`sign_along`, ``work.field`` and ``work.gradient`` are current.
-    """
+def keeps_speed(model, transition, place, speed, moment, work):
+    """Whether a guard keeps half of its ``speed`` for a ``moment``; ``work.field`` is current."""
     mode, t, x = place
-    if not moves(model, run, transition, place, speed, drift, work):
-        return False
-    band = rounding_band(model, run, transition, t, x, work)
-    moment = way * max(band / abs(speed), moment_of_rounding(model, run, t, work))
     for i in range(model.dimension):
         work.settled[i] = x[i] + moment * work.field[i]
     model.field(mode, t + moment, work.settled, model.parameters, work.field_after)
@@ -149,18 +141,33 @@ def sign_along(model, run, transition, place, way, work):
     ``way`` is 1 for what comes after the ``place`` of a run, and -1 for what came before. Third comes whether
     the speed of the guard at the place tells. ``work.field`` is current, and is on return.
     """
-    mode, t, x = place
+    _, t, x = place
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
+    band = rounding_band(model, run, transition, t, x, work)
+    return sign_at_speed(model, run, transition, place, way, speed, band, work)
+
+
+@njit(**KERNEL)
+def sign_at_speed(model, run, transition, place, way, speed, band, work):
+    """``sign_along`` for a guard whose ``speed`` and rounding at the place are known.
+
+    The speed tells if it keeps half of itself until the guard is out of its rounding, the ``band``.
+    ``work.gradient`` is current.
+    """
+    mode, t, x = place
     drift = speed_rounding(model, run, transition, mode, t, x, work)
-    moment = LONGER * moment_of_rounding(model, run, t, work)
-    if leaves_by_speed(model, run, transition, place, way, speed, drift, work):
-        return (1 if speed * way > 0.0 else -1), moment, True
+    moment = moment_of_rounding(model, run, t, work)
+    if moves(model, run, transition, place, speed, drift, work):
+        needed = max(band / abs(speed), moment)
+        if keeps_speed(model, transition, place, speed, way * needed, work):
+            return (1 if speed * way > 0.0 else -1), LONGER * moment, True
+    moment *= LONGER
     model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
     longest, feedback = unit_of_time(model, run, work), pace_of_feedback(model, mode, work.jacobian)
     longest = LONGEST * (min(longest, 1.0 / feedback) if feedback > 0.0 else longest)
     if not drift < math.inf:
         drift = 0.0
-    while 0.0 < moment <= longest:
+    while 0.0 < moment <= longest < math.inf:
         later = t + way * moment
         move_for(model, mode, t, x, way * moment, work.settled, work)
         value = guard_value(model, transition, later, work.settled, work.scalar)

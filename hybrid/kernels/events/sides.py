@@ -20,6 +20,7 @@ from hybrid.kernels.events.moments import (
     move_for,
     moves,
     sign_along,
+    sign_at_speed,
     speed_rounding,
 )
 from hybrid.kernels.events.onset import AT_REST, BY_SPEED, LATER
@@ -106,13 +107,14 @@ def side_of(model, run, place, transition, came, before, work):
     value = guard_value(model, transition, t, x, work.scalar)
     if math.isnan(value):
         return before.side, LATER if may_jump(model, run, transition, t, x, work) else 0
-    model.guard_gradient(transition, t, x, model.parameters, work.gradient)
+    speed = guard_speed(model, transition, t, x, work.field, work.gradient)
+    band = rounding_band(model, run, transition, t, x, work)
     sign = 1 if value > 0.0 else -1
-    if abs(value) == math.inf or abs(value) > rounding_band(model, run, transition, t, x, work):
+    if abs(value) == math.inf or abs(value) > band:
         return sign, 0
     if came == STARTED and value != 0.0 and may_jump(model, run, transition, t, x, work):
         return sign, 0
-    side, _, straight = sign_along(model, run, transition, place, 1.0, work)
+    side, _, straight = sign_at_speed(model, run, transition, place, 1.0, speed, band, work)
     if side != 0:
         return side, BY_SPEED if straight else LATER
     direction = model.direction[transition]
