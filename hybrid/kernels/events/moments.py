@@ -1,9 +1,9 @@
 """The sign of a guard along the flow, a moment before or after a place where rounding hides it.
 
 A guard that rounding cannot tell from zero is on the side to which the flow takes it. Its speed tells the
-side if it has one sign for all that rounding may have made of the state. Otherwise the sign of the guard
-itself does, at the first moment at which rounding no longer hides it. That holds for a guard that leaves zero
-by its acceleration or by a higher derivative, at a kink, and where the guard jumps.
+side if it takes the guard out of its rounding. Otherwise the sign of the guard itself does, at the first
+moment at which rounding no longer hides it. That holds for a guard that leaves zero by its acceleration or by
+a higher derivative, at a kink, and where the guard jumps.
 
 The moments grow from the rounding of the time. Each is one step of the classical Runge-Kutta method, whose
 error goes with the fifth power of the step. Up to the fifth root of rounding, in units of the time in which
@@ -117,13 +117,6 @@ def move_for(model, mode, t, x, moment, out, work):
 
 
 @njit(**KERNEL)
-def moves(model, run, transition, place, speed, drift, work):
-    """Whether a guard has a ``speed`` that exceeds its own rounding ``drift``, and does not jump instead."""
-    _, t, x = place
-    return drift < abs(speed) < math.inf and not may_jump(model, run, transition, t, x, work)
-
-
-@njit(**KERNEL)
 def keeps_speed(model, transition, place, speed, moment, work):
     """Whether a guard keeps half of its ``speed`` for a ``moment``; ``work.field`` is current."""
     mode, t, x = place
@@ -151,16 +144,17 @@ def sign_along(model, run, transition, place, way, work):
 def sign_at_speed(model, run, transition, place, way, speed, band, work):
     """``sign_along`` for a guard whose ``speed`` and rounding at the place are known.
 
-    The speed tells if it keeps half of itself until the guard is out of its rounding, the ``band``.
-    ``work.gradient`` is current.
+    The speed tells if it keeps half of itself until the guard is out of its rounding, the ``band``, in no more
+    than a unit of time. ``work.gradient`` is current.
     """
     mode, t, x = place
     drift = speed_rounding(model, run, transition, mode, t, x, work)
     moment = moment_of_rounding(model, run, t, work)
-    if moves(model, run, transition, place, speed, drift, work):
+    if drift < abs(speed) < math.inf and not may_jump(model, run, transition, t, x, work):
         needed = max(band / abs(speed), moment)
-        if keeps_speed(model, transition, place, speed, way * needed, work):
-            return (1 if speed * way > 0.0 else -1), LONGER * moment, True
+        in_time = needed <= max(unit_of_time(model, run, work), moment)
+        if in_time and keeps_speed(model, transition, place, speed, way * needed, work):
+            return (1 if speed * way > 0.0 else -1), needed, True
     moment *= LONGER
     model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
     longest, feedback = unit_of_time(model, run, work), pace_of_feedback(model, mode, work.jacobian)
@@ -178,3 +172,31 @@ def sign_at_speed(model, run, transition, place, way, speed, band, work):
                 return (1 if value > 0.0 else -1), moment, False
         moment *= LONGER
     return 0, 0.0, False
+
+
+@njit(**KERNEL)
+def sign_of_speed(model, run, transition, place, work):
+    """The sign that a guard's speed has at all states that rounding cannot tell from a place; else 0.
+
+    The speed of a guard that may jump says nothing. ``work.field`` is current.
+    """
+    mode, t, x = place
+    n, beside = model.dimension, work.settled
+    speed = guard_speed(model, transition, t, x, work.field, work.gradient)
+    drift = speed_rounding(model, run, transition, mode, t, x, work)
+    if not drift < abs(speed) < math.inf or may_jump(model, run, transition, t, x, work):
+        return 0
+    for i in range(n):
+        beside[i] = x[i]
+    for i in range(n + 1 if model.affine_guard[transition] == 0 else 0):
+        for way in (-SHARE, SHARE):
+            later = t
+            if i < n:
+                beside[i] = x[i] + way * run.scale[i]
+            else:
+                later = t + way * size_of_time(model, t)
+            if guard_speed(model, transition, later, beside, work.field, work.gradient) * speed < 0.0:
+                return 0
+        if i < n:
+            beside[i] = x[i]
+    return 1 if speed > 0.0 else -1

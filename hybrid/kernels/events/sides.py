@@ -18,9 +18,9 @@ from hybrid.kernels.events.moments import (
     Place,
     moment_of_rounding,
     move_for,
-    moves,
     sign_along,
     sign_at_speed,
+    sign_of_speed,
     speed_rounding,
 )
 from hybrid.kernels.events.onset import AT_REST, BY_SPEED, LATER
@@ -239,12 +239,14 @@ def take_side(model, run, place, transition, arrival, known_sides, work):
     if own and order == 0 and is_back_soon(model, run, place, transition, now, work):
         # Off the guard, where it has left the state, the reset's own guard has not been reached again.
         now, order = -now, LATER
-    if own and order in (LATER, AT_REST):
-        speed = guard_speed(model, transition, t, x, work.field, work.gradient)
-        drift = speed_rounding(model, run, transition, mode, t, x, work)
-        if moves(model, run, transition, place, speed, drift, work):
+    if own and order > 0 and (order != BY_SPEED or now != -direction):
+        given = sign_of_speed(model, run, transition, place, work)
+        if given != 0:
             # Its own reset has begun a flight, even if that is lower or shorter than rounding.
-            now, order = 1 if speed > 0.0 else -1, BY_SPEED
+            now, order = given, BY_SPEED
+        elif order == BY_SPEED:
+            # The speed is rounding, which may have made it a push.
+            order = LATER
     if own and order == AT_REST and direction != 0:
         # Its own reset has stopped the state on the guard, as a plastic impact does.
         passes = before.order > 0 and crosses_slowly(model, run, place, transition, work)
