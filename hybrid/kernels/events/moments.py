@@ -144,8 +144,8 @@ def sign_along(model, run, transition, place, way, work):
 def sign_at_speed(model, run, transition, place, way, speed, band, work):
     """``sign_along`` for a guard whose ``speed`` and rounding at the place are known.
 
-    The speed tells if it keeps half of itself until the guard is out of its rounding, the ``band``, in no more
-    than a unit of time. ``work.gradient`` is current.
+    The speed tells if it keeps half of itself until the guard is out of its rounding, the ``band``, in a unit
+    of time or less. ``work.gradient`` is current.
     """
     mode, t, x = place
     drift = speed_rounding(model, run, transition, mode, t, x, work)
