@@ -13,8 +13,6 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 ROUNDING_OF_STATE = 16
 # How far from zero a jump may leave a guard, as a multiple of its rounding band.
 LEFT_BEHIND = 16.0
-# A guard within rounding of zero jumps if it exceeds this many times the rounding that its gradient predicts.
-SMOOTH = 4.0
 # The row of ``work.rounding`` for a place beside the state.
 PLACE = 3
 
@@ -102,6 +100,8 @@ def was_left_behind(model, run, transition, t, x, speed, side, work):
     """
     if not speed * side > 0.0:
         return False
+    if may_jump(model, run, transition, t, x, work):
+        return False
     value = guard_value(model, transition, t, x, work.scalar)
     return abs(value) <= LEFT_BEHIND * rounding_band(model, run, transition, t, x, work)
 
@@ -170,15 +170,14 @@ def spread_of_terms(model, run, program, share, t, x, work):
 
 
 @njit(**KERNEL)
-def exceeds_slope(model, run, transition, t, x, value, work):
-    """Whether a guard that has a program is larger than its slope lets rounding make it, as beside a jump.
-
-    The large terms of a guard may leave a flat slope, and more rounding than the slope tells.
-    """
-    band = smooth_band(model, run, transition, t, x, work)
-    if not may_jump(model, run, transition, t, x, work):
-        band += spread_of_terms(model, run, transition, 0.0, t, x, work)
-    return abs(value) > SMOOTH * band
+def pace_of_feedback(model, mode, jacobian):
+    """How fast the fastest feedback of a component on itself acts, or of two components on each other."""
+    fastest = 0.0
+    for i in range(model.dimension):
+        for place in range(model.first_slope[mode, i], model.first_slope[mode, i + 1]):
+            j = model.slope_column[place]
+            fastest = max(fastest, abs(jacobian[i, j] * jacobian[j, i]))
+    return math.sqrt(fastest)
 
 
 @njit(**KERNEL)
@@ -192,14 +191,13 @@ def widen_scale(model, run, work):
     """
     n, mode, t = model.dimension, run.mode, run.phase
     jacobian_with_opposites(model, mode, t, run.y, work.jacobian)
-    rounding, feedback = work.state, 0.0
+    rounding, feedback = work.state, pace_of_feedback(model, mode, work.jacobian)
     longest = max(run.horizon, size_of_time(model, t)) if run.horizon > 0.0 else math.inf
     for i in range(n):
         size = abs(work.field[i]) + abs(work.jacobian[i, n]) * size_of_time(model, t)
         for place in range(model.first_slope[mode, i], model.first_slope[mode, i + 1]):
             j = model.slope_column[place]
             size += abs(work.jacobian[i, j] * run.y[j])
-            feedback = max(feedback, abs(work.jacobian[i, j] * work.jacobian[j, i]))
         rounding[i] = ROUNDING_OF_STATE * EPSILON * size
     first = model.target.shape[0] + model.first_forcing[-1]
     for residue in range(model.first_residue[mode], model.first_residue[mode + 1]):
@@ -212,7 +210,7 @@ def widen_scale(model, run, work):
         rate = abs(work.field[i])
         moment = rate / abs(change) if abs(change) > noise else math.inf
         if feedback > 0.0:
-            moment = min(moment, 1.0 / math.sqrt(feedback))
+            moment = min(moment, 1.0 / feedback)
         if moment < math.inf:
             moment = min(moment, longest)
             run.scale[i] = max(run.scale[i], rate * moment)

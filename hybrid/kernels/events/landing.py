@@ -14,7 +14,6 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.clock import forward, set_clock, time_left
-from hybrid.kernels.events.derivatives import moment_of_rounding
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
     allowed,
@@ -24,6 +23,7 @@ from hybrid.kernels.events.guards import (
     rounding_band,
     size_of_time,
 )
+from hybrid.kernels.events.moments import moment_of_rounding
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 

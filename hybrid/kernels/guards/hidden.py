@@ -16,6 +16,7 @@ from hybrid.kernels.events.guards import (
     may_jump,
     rounding_band,
 )
+from hybrid.kernels.events.onset import AT_REST
 from hybrid.kernels.guards.pieces import NO_COLUMN, as_column, bounds_on, sample
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
@@ -48,7 +49,7 @@ def farthest_from_zero(model, path, guard, place, work):
 
 @njit(**KERNEL)
 def hidden_until(model, method, run, path, guard, end, work):
-    """The place of a step up to which the signs of a guard that is zero at its start are noise.
+    """The place of a step up to which the error of the method hides the signs of a guard zero at its start.
 
     Returned second is whether the guard rests at zero. The tolerances bound the error of a step, not that of
     its interpolant, which may be larger. Then the value of the guard at the ``end`` of the step tells its
@@ -62,8 +63,8 @@ def hidden_until(model, method, run, path, guard, end, work):
     rounding = rounding_band(model, run, transition, start, run.y, work)
     error, rounding = as_column(model, run, guard, error), as_column(model, run, guard, rounding)
     size = farthest_from_zero(model, path, guard, length, work)
-    if size < math.inf:
-        # What is zero at the start has a size and rounding on the step.
+    if guard.on_guard == AT_REST and size < math.inf:
+        # What is zero at the start and rests there has a size and rounding on the step.
         rounding += ROUNDING_OF_STATE * EPSILON * size
     noise = rounding + min(max(error, abs(end)), MARGIN * error)
     place, farthest = length, size

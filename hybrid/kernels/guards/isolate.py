@@ -12,7 +12,6 @@ from typing import NamedTuple
 from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT, crosses_towards
-from hybrid.kernels.events.beside import MOST_MOMENTS, signs_beside
 from hybrid.kernels.events.guards import (
     error_band,
     gradient_band,
@@ -20,15 +19,13 @@ from hybrid.kernels.events.guards import (
     size_of_time,
     was_left_behind,
 )
+from hybrid.kernels.events.moments import Place, sign_along
 from hybrid.kernels.events.onset import (
-    BY_ACCELERATION,
+    AT_REST,
     BY_SPEED,
-    BY_STEP,
-    JUMPING,
+    LATER,
     has_just_fired,
-    is_zero,
     known_part,
-    side_is_certain,
 )
 from hybrid.kernels.events.path import pace_at_start, rounding_of_start, state_at, time_at
 from hybrid.kernels.guards.hidden import hidden_until
@@ -83,7 +80,7 @@ def guard_at_start(model, run, transition, column):
     """
     side, on_guard = run.side[transition], run.on_guard[transition]
     rooted = model.propagator[run.mode] == DESINGULARISED or model.propagator[run.mode] == ROOTED
-    if rooted and column != NO_COLUMN and on_guard == BY_ACCELERATION:
+    if rooted and column != NO_COLUMN and on_guard == LATER:
         on_guard = BY_SPEED
     return Guard(transition, column, side, on_guard, 0.0, 0.0, 0.0)
 
@@ -122,24 +119,24 @@ def _known_at_start(model, path, guard, hidden, work):
     Up to the place ``hidden`` its signs are noise.
     """
     on_guard, sure, base, tilt = guard.on_guard, 0.0, 0.0, 0.0
-    leaves = on_guard == JUMPING and hidden > 0.0
+    leaves = on_guard == LATER and hidden > 0.0
     if leaves:
         sure = hidden
-    if is_zero(on_guard):
+    elif on_guard in (BY_SPEED, AT_REST):
         at = bounds_at(model, path, guard, 0.0, work)
         least, most = at.least_slope, at.most_slope
         base, tilt = known_part(middle_of(at), 0.5 * (least + most), on_guard)
-        leaves = on_guard == BY_SPEED and side_is_certain(on_guard, least, most)
+        leaves = on_guard == BY_SPEED
     return Guard(guard.transition, guard.column, guard.side, on_guard, sure, base, tilt), leaves
 
 
 @njit(**KERNEL)
 def _first_place(model, run, path, on_guard, hidden):
-    """The place of a path from which on the signs of a guard of this order tell anything."""
+    """The place of a path from which on the signs of a guard tell anything."""
     if on_guard == 0:
         return 0.0
     place = max(hidden, SETTLED * path.length)
-    if on_guard == JUMPING and not hidden > 0.0:
+    if on_guard == LATER and not hidden > 0.0:
         # By rounding the state may still be before the jump.
         beyond = rounding_of_start(path, model.dimension, run.scale, size_of_time(model, path.start))
         place = max(place, min(beyond, 0.5 * path.length))
@@ -245,17 +242,18 @@ def first_change(model, method, run, path, guard, hidden, work):
 @njit(**KERNEL)
 def _hidden_at_start(model, method, run, path, guard, end, work):
     """The place of a step up to which the signs of a guard are noise, and whether it rests at zero."""
-    transition = guard.transition
-    if guard.on_guard == BY_STEP:
-        return hidden_until(model, method, run, path, guard, end, work)
-    if guard.on_guard == JUMPING and has_just_fired(run, transition, guard.on_guard):
-        model.field(run.mode, path.start, run.y, model.parameters, work.field)
-        _, beside, moment = signs_beside(model, run, transition, path.start, run.y, MOST_MOMENTS, work)
-        rate = pace_at_start(path)
-        if beside == guard.side and rate > 0.0:
-            # Up to there the state may be on either side by rounding.
-            return min(moment / rate, 0.5 * path.length), False
-    return 0.0, False
+    if guard.on_guard < LATER:
+        return 0.0, False
+    hidden, rests = hidden_until(model, method, run, path, guard, end, work)
+    if guard.on_guard == AT_REST:
+        return hidden, rests
+    t, rate = path.start, pace_at_start(path)
+    model.field(run.mode, t, run.y, model.parameters, work.field)
+    side, moment, _ = sign_along(model, run, guard.transition, Place(run.mode, t, run.y), 1.0, work)
+    if side == guard.side and rate > 0.0:
+        # Up to there the state may be on either side by rounding.
+        hidden = max(hidden, moment / rate)
+    return hidden, hidden >= path.length
 
 
 @exported(Pair(REAL), Model, Method, Run, INTEGER, INTEGER, Path, REAL, Work)
@@ -263,7 +261,7 @@ def crossing_on_path(model, method, run, transition, column, path, end, work):
     """``first_change`` from the side that the run knows; ``sampled_change`` if the guard was not traced.
 
     ``column`` is that of the guard on the path, or ``NO_COLUMN``. ``end`` is the value of a guard at the end
-    of the step, which the path may hold with other rounding; only one of the order ``BY_STEP`` needs it.
+    of the step, which the path may hold with other rounding. A guard that leaves by its speed needs none.
     Returns the share of the step at which the guard crosses, and the share that is proved; the side after the
     crossing, or at the end, goes to ``run.rehearsal[3, transition]``. The guard is no longer held to be zero
     at the start of the step, unless it rests there.
@@ -272,6 +270,7 @@ def crossing_on_path(model, method, run, transition, column, path, end, work):
     hidden, rests = _hidden_at_start(model, method, run, path, guard, end, work)
     run.rehearsal[3, transition] = guard.side
     if rests:
+        # Or it leaves zero on a later step.
         return NO_ROOT, 1.0
     run.on_guard[transition] = 0
     if hidden == length:

@@ -11,7 +11,7 @@ from numba import njit
 
 from hybrid.kernels.events.bounds import bound_state
 from hybrid.kernels.events.guards import guard_value
-from hybrid.kernels.events.onset import is_zero, side_is_certain
+from hybrid.kernels.events.onset import AT_REST, BY_SPEED
 from hybrid.kernels.events.path import state_at, time_at
 from hybrid.kernels.guards.touch import APART
 from hybrid.kernels.types.codes import (
@@ -222,8 +222,8 @@ def known_at(model, path, guard, place, side, work):
 def _begins_on_side(model, path, guard, high, work):
     """Whether a guard is on its side at the start of a path, if it is not at ``high``."""
     at = bounds_at(model, path, guard, 0.0, work)
-    if is_zero(guard.on_guard):
-        begins = side_is_certain(guard.on_guard, at.least_slope, at.most_slope)
+    if guard.on_guard in (BY_SPEED, AT_REST):
+        begins = guard.on_guard == BY_SPEED
         value = middle_of(at)
     else:
         value = _value_at(model, path, guard, 0.0, at, work)

@@ -3,7 +3,7 @@
 from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import crosses_towards
-from hybrid.kernels.events.onset import BY_STEP, has_just_fired, is_zero
+from hybrid.kernels.events.onset import AT_REST, LATER, has_just_fired
 from hybrid.kernels.guards.pieces import NOWHERE, sample
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
@@ -25,10 +25,10 @@ def sampled_change(model, run, path, guard, hidden, work):
         value = sample(model, transition, path, high, work)
         if value * side < 0.0:
             left, right = low, high
-            if i == 1 and not is_zero(on_guard) and hidden == 0.0:
+            if i == 1 and on_guard in (0, LATER) and hidden == 0.0:
                 first = sample(model, transition, path, 0.0, work)
                 right = 0.0 if first * side <= 0.0 else high
-            elif i == 1 and on_guard == BY_STEP:
+            elif i == 1 and on_guard == AT_REST:
                 right = 0.0
             while right - left > 2.0 * EPSILON * right:
                 middle = 0.5 * (left + right)

@@ -3,32 +3,28 @@
 from numba import njit
 
 from hybrid.kernels.arithmetic.bernstein import crosses_towards
-from hybrid.kernels.events.derivatives import acceleration_rounding, speed_rounding
 from hybrid.kernels.events.guards import (
     allowed,
     carry_rounding,
-    guard_acceleration,
-    guard_speed,
     guard_value,
     keep_grazing,
-    may_jump,
-    was_left_behind,
     widen_scale,
 )
 from hybrid.kernels.events.landing import land_beyond
-from hybrid.kernels.events.onset import BY_SPEED, BY_STEP
+from hybrid.kernels.events.moments import Place
+from hybrid.kernels.events.onset import BY_SPEED, LATER
 from hybrid.kernels.events.resolution import NOT_KNOWN, leads_to_guard, stays_on_guard, underflows
 from hybrid.kernels.events.sides import (
     FLOWED,
     LANDED,
     STARTED,
     Arrival,
-    Place,
+    Before,
     Sides,
     beyond_at_start,
     end_instant,
     order_passed,
-    side_of,
+    side_here,
     sides_of,
     take_sides,
 )
@@ -101,14 +97,8 @@ def arrived(task):
             continue
         if underflows(model, transition, t, run.y, t, run.y, work.scalar):
             continue
-        now, order = side_of(model, run, Place(mode, t, run.y), transition, before, False, work)
-        if order == BY_STEP and may_jump(model, run, transition, t, run.y, work):
-            # An event at a jump of the guard lies beyond the near side.
-            now = -before
-        elif now == -before and order == 0:
-            speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
-            if was_left_behind(model, run, transition, t, run.y, speed, before, work):
-                now = before
+        place = Place(mode, t, run.y)
+        now, _ = side_here(model, run, place, transition, STARTED, Before(before, 0), False, work)
         crossed = now == -before and crosses_towards(model.direction[transition], now)
         if crossed and allowed(model, transition, t, run.y, work.scalar):
             found = transition
@@ -162,24 +152,16 @@ def order_matters(model, run, one, other, work):
 
 @njit(**KERNEL)
 def turns_back(model, run, transition, before, work):
-    """Whether a guard only touches zero here: it moves to the side ``before`` again, or turns there at rest.
+    """Whether the flow only touches a guard that it has reached: soon it is back on the side ``before``.
 
-    At the bottom of a dip that is no deeper than rounding either end may be found first. A guard that is at
-    rest and turns no faster than rounding would have it has been crossed, by its third derivative. The sides
-    have just been taken: most guards are known to move on.
+    The sides have just been taken. At the bottom of a dip that is no deeper than rounding either end may be
+    found first. If the speed leads back, and the field leads to the guard from both sides, the state comes to
+    rest there.
     """
-    if run.on_guard[transition] == BY_SPEED and run.side[transition] != before:
+    order, mode = run.on_guard[transition], run.mode
+    if run.side[transition] != before or order not in (BY_SPEED, LATER):
         return False
-    mode, t = run.mode, run.phase
-    model.field(mode, t, run.y, model.parameters, work.field)
-    speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
-    if abs(speed) > speed_rounding(model, run, transition, mode, t, run.y, work):
-        # If the field leads to the guard from both sides, the state comes to rest there.
-        return speed * before > 0.0 and not leads_to_guard(
-            model, run, transition, mode, t, run.y, before, work
-        )
-    acceleration = guard_acceleration(model, run, transition, mode, t, run.y, work)
-    return acceleration * before > acceleration_rounding(model, run, transition, mode, t, run.y, work)
+    return order == LATER or not leads_to_guard(model, run, transition, mode, run.phase, run.y, before, work)
 
 
 @njit(**KERNEL)
@@ -194,12 +176,9 @@ def recall_sides(model, run):
 
 @njit(**KERNEL)
 def has_only_touched(model, run, record, fired, side, work):
-    """Whether the flow has only touched the guard of ``fired``, with the ``side`` beyond it; then a grazing.
-
-    For a guard that is not affine, the change of sign is proved.
-    """
+    """Whether the flow has only touched a guard, with the ``side`` beyond it; then a grazing is kept."""
     t = run.phase
-    if model.affine_guard[fired] == 0 or not turns_back(model, run, fired, -side, work):
+    if not turns_back(model, run, fired, -side, work):
         return False
     if not allowed(model, fired, t, run.y, work.scalar):
         return False
@@ -256,7 +235,9 @@ def first_in_order(task, fired, stop_cycle, stop_phase):
         if run.due[other] == 1 and other != fired:
             land_beyond(model, run, other, run.side[other], stop_cycle, stop_phase, work)
     chosen = first_due(model, run, work)
-    if touched or chosen == NO_TRANSITION:
+    if touched:
+        run.side[fired] = -beyond
+    elif chosen == NO_TRANSITION:
         run.side[fired] = 0
     if chosen == NO_TRANSITION:
         for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):

@@ -10,7 +10,6 @@ from numba import njit
 from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.arithmetic.clock import forward, measured_time
 from hybrid.kernels.arithmetic.slopes import spread_of_rate
-from hybrid.kernels.events.derivatives import speed_rounding
 from hybrid.kernels.events.guards import (
     guard_speed,
     guard_value,
@@ -19,6 +18,7 @@ from hybrid.kernels.events.guards import (
     rounding_band,
     size_of_time,
 )
+from hybrid.kernels.events.moments import speed_rounding
 from hybrid.kernels.events.sides import mode_of_limit
 from hybrid.kernels.guards.isolate import first_change
 from hybrid.kernels.guards.pieces import NO_COLUMN, NOWHERE, Guard

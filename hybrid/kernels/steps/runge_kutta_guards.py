@@ -15,13 +15,12 @@ from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
     error_band,
-    guard_acceleration,
     guard_speed,
     guard_value,
     may_jump,
     rounding_band,
 )
-from hybrid.kernels.events.onset import BY_ACCELERATION, BY_SPEED, BY_STEP
+from hybrid.kernels.events.onset import BY_SPEED, LATER
 from hybrid.kernels.events.resolution import (
     MARGIN,
     field_holds,
@@ -131,7 +130,7 @@ def asks_error(run, on_guard):
 
     A guard that has stayed within rounding of zero on the steps before has other derivatives by now.
     """
-    return on_guard in (BY_SPEED, BY_ACCELERATION) and run.since_entry == 0.0
+    return on_guard == BY_SPEED and run.since_entry == 0.0
 
 
 @njit(**KERNEL)
@@ -148,14 +147,12 @@ def outweighs_error(model, run, growth, h, work):
 
 
 @njit(**KERNEL)
-def leaves_as_known(model, run, transition, on_guard, t, h, work):
+def leaves_as_known(model, run, transition, t, h, work):
     """``outweighs_error`` for a guard that is no polynomial on the step."""
     for i in range(model.dimension):
         work.field[i] = work.stages[0, i]
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
     growth = h * speed
-    if on_guard == BY_ACCELERATION:
-        growth = 0.5 * h * h * guard_acceleration(model, run, transition, run.mode, t, run.y, work)
     return math.isnan(growth) or outweighs_error(model, run, growth * run.side[transition], h, work)
 
 
@@ -200,10 +197,10 @@ def stays_on_side(model, method, run, transition, path, work):
         band = rounding_on_step(model, run, transition, t, h, work)
         if largest_magnitude(work.polynomial, degree) <= band:
             return True
-    for _ in range(on_guard if on_guard != BY_STEP else 0):
+    if on_guard == BY_SPEED:
         degree = divide_by_theta(work.polynomial, degree)
     error = error_band(method, run, work.gradient, model.dimension)
-    if on_guard != BY_STEP and stays(work.polynomial, degree, run.side[transition], error):
+    if on_guard < LATER and stays(work.polynomial, degree, run.side[transition], error):
         run.on_guard[transition] = 0
         return True
     affine_powers(model, method, start, h, work)
@@ -218,9 +215,9 @@ def crossing_on_step(attempts, model, method, run, transition, path, work):
         if stays_on_side(model, method, run, transition, path, work):
             return NO_ROOT, 1.0, True
         column = model.dimension
-    end = guard_value(model, transition, t + h, work.new, work.scalar) if on_guard == BY_STEP else 0.0
+    end = guard_value(model, transition, t + h, work.new, work.scalar) if on_guard >= LATER else 0.0
     known = asks_error(run, on_guard)
-    unsure = known and not leaves_as_known(model, run, transition, on_guard, t, h, work)
+    unsure = known and not leaves_as_known(model, run, transition, t, h, work)
     theta, share = attempts.crossing_on_path(model, method, run, transition, column, path, end, work)
     side = run.rehearsal[3, transition]
     run.rehearsal[3, transition] = 0

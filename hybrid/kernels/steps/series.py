@@ -14,8 +14,8 @@ from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.columns import evaluate, evaluate_with_sizes, gather_tangents
 from hybrid.kernels.arithmetic.powers import power_of_two
 from hybrid.kernels.events.bounds import bound_state
-from hybrid.kernels.events.derivatives import speed_rounding
 from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced, sides_at
+from hybrid.kernels.events.moments import speed_rounding
 from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.events.path import state_at, time_at, up_to, value_at
 from hybrid.kernels.events.record import start_record

@@ -15,7 +15,7 @@ from hybrid.kernels.events.guards import (
     rounding_band,
     size_of_time,
 )
-from hybrid.kernels.events.onset import BY_STEP
+from hybrid.kernels.events.onset import BY_SPEED, LATER
 from hybrid.kernels.events.path import time_at
 from hybrid.kernels.events.resolution import (
     MARGIN,
@@ -244,7 +244,7 @@ def leading_of(model, method, run, guard, path, work):
     """The ``Leading`` of a guard, and whether the guard rests at zero."""
     transition, column, t = guard.transition, guard.column, path.start
     model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
-    known = guard.on_guard if guard.on_guard != BY_STEP else 0
+    known = 1 if guard.on_guard == BY_SPEED else 0
     size, power = beyond_known_roots(
         path.powers, column, path.length, known, path.powers[path.degree + 2, column]
     )
@@ -294,7 +294,7 @@ def crossing_by_pieces(attempts, model, method, run, transition, column, path, w
     on_guard, later, order, end = run.on_guard[transition], time_at(path, path.length), path.degree, 0.0
     for i in range(model.dimension):
         work.trial[i] = path.powers[order + 1, i]
-    if on_guard == BY_STEP:
+    if on_guard >= LATER:
         if column == NO_COLUMN:
             end = guard_value(model, transition, later, work.trial, work.scalar)
         else:
@@ -321,7 +321,7 @@ def crossing_on_series(attempts, model, method, run, transition, column, path, w
         leading, rests = leading_of(model, method, run, guard, path, work)
         if rests:
             return NO_ROOT, 1.0, True
-        if guard.on_guard != BY_STEP:
+        if guard.on_guard < LATER:
             # The second cheap proof: the leading powers keep to their side, whatever the others do.
             verdict, theta, resolved = crossing_by_leading(model, run, leading, path, work)
             if verdict != UNKNOWN:

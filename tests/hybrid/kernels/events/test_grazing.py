@@ -73,11 +73,11 @@ class TestTouches:
     def test_below_the_guard_each_crossing_fires_once(self, c, guard, direction):
         arc = run(-c, guard, direction)
         expected = 2 if direction == 0 else 1
-        if c >= 1e-14:
+        if c >= 1e-13:
             assert len(arc.jumps) == expected
         else:
-            # The depth is about the rounding of 1 - c.
-            assert arc.x[-1, 2] == len(arc.jumps) <= 2
+            # The depth is about the rounding of a state whose terms come to 4.
+            assert arc.x[-1, 2] == len(arc.jumps) in (0, expected)
             assert len(arc.jumps) + len(arc.grazings) > 0
         if c >= 1e-9:
             exact = [1 - np.sqrt(c), 1 + np.sqrt(c)]
@@ -210,11 +210,11 @@ class TestBounces:
     def test_one_bounce_or_none(self, c):
         """After a grazing bounce the parabola leads away, and the state follows the exact motion."""
         arc = simulate(rigid(), (1.0 - c, -2.0), (0.0, 2.0))
-        assert len(arc.jumps) in ((1,) if c >= 1e-14 else (0, 1))
+        assert len(arc.jumps) in ((1,) if c >= 1e-13 else (0, 1))
         s = np.sqrt(c)
         exact = 0.8 * 2 * s * (1 + s) + (1 + s) ** 2
         # Rounding of the height, about 1e-14, divided by the wall speed; near the wall its square root.
-        assert arc.x[-1, 0] == pytest.approx(exact, abs=3e-14 / s if c >= 1e-14 else 4e-7)
+        assert arc.x[-1, 0] == pytest.approx(exact, abs=3e-14 / s if c >= 1e-13 else 4e-7)
 
     @given(
         u=st.floats(0.5, 13.0),

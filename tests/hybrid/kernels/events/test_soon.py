@@ -29,6 +29,6 @@ def test_a_guard_fires_once_where_its_path_leads_up(solver, a, b, c):
         CROSSED_UP, (0.0, 0.0), (3.7, 5.0), parameters={"a": a, "b": b, "c": c}, solver=SOLVERS[solver]
     )
     assert arc.status.ok
-    # In the last case the start itself leads up.
+    # In the last case the start itself leads up. Steps do not know heights below their tolerances.
     assert len(arc.jumps) == 1
-    assert np.abs(height(arc.jumps.t - 3.7)).max() < 1e-12
+    assert np.abs(height(arc.jumps.t - 3.7)).max() < (1e-12 if solver == "Taylor" else 1e-9)
