@@ -23,7 +23,7 @@ def exact(value: Value) -> Value:
     fraction = Fraction(value)
     if max(abs(fraction.numerator), fraction.denominator).bit_length() > EXACT_DIGITS:
         try:
-            return float(fraction)
+            return exact(float(fraction))
         except OverflowError:
             return math.inf if fraction > 0 else -math.inf
     return fraction.numerator if fraction.denominator == 1 else fraction

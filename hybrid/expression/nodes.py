@@ -174,9 +174,6 @@ class Expression:
     def __neg__(self) -> Expression:
         return multiply(MINUS_ONE, self)
 
-    def __pos__(self) -> Expression:
-        return self
-
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), self.args
 
@@ -209,18 +206,15 @@ class Number(Expression):
 
     @property
     def is_exact(self) -> bool:
-        """Whether it is a whole number or a fraction."""
         return not isinstance(self.value, float)
 
     @property
     def is_whole(self) -> bool:
-        """Whether it is a whole number."""
         return isinstance(self.value, int)
 
     @property
     def leads_with_minus(self) -> bool:
-        """Whether it is negative."""
-        return self.value < 0
+        return bool(self.value < 0)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Number, (self.value,)

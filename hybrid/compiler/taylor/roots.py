@@ -42,7 +42,6 @@ from hybrid.expression.operations import CubeRoot
 from hybrid.expression.polynomials import expanded, ratio
 from hybrid.expression.ranges import range_of
 from hybrid.expression.signs import sign_of
-from hybrid.expression.text import text
 from hybrid.expression.tracing import Symbols
 
 ROOT = Symbol("w", positive=True)
@@ -95,11 +94,11 @@ def singular_bases(
             continue
         if not any(is_multiple(base, guard, symbols) for guard in known):
             if not range_of(base).low.value >= 0.0:
-                power_of = f"it has the power {text(exponent)} of an expression"
+                power_of = f"it has the power {exponent} of an expression"
                 raise NoSeries(f"{power_of} that may change sign and is not a guard")
             continue
         if not (is_positive(exponent) and exponent.is_exact):
-            raise NoSeries(f"it has the power {text(exponent)} of a guard")
+            raise NoSeries(f"it has the power {exponent} of a guard")
         bases.setdefault(base, []).append(Fraction(exponent.value))
     return {base: _order(bases[base]) for base in sorted(bases, key=order_of)}
 

@@ -47,17 +47,9 @@ from hybrid.expression.operations import (
 from hybrid.kernels.types.codes import NARROW
 
 # Functions whose derivatives consist of operations with recurrences.
-BY_DERIVATIVE = (
-    Log, Log1p, Expm1,
-    Arcsin, Arccos, Arctan, Arcsinh, Arccosh, Arctanh,
-)  # fmt: skip
+BY_DERIVATIVE = (Log, Log1p, Expm1, Arcsin, Arccos, Arctan, Arcsinh, Arccosh, Arctanh)
 # A pair of functions, and the sign in the derivative of the second: cos' = -sin, cosh' = sinh.
-PAIRS = {
-    Sin: (Sin, Cos, "-"),
-    Cos: (Sin, Cos, "-"),
-    Sinh: (Sinh, Cosh, ""),
-    Cosh: (Sinh, Cosh, ""),
-}
+PAIRS = dict.fromkeys((Sin, Cos), (Sin, Cos, "-")) | dict.fromkeys((Sinh, Cosh), (Sinh, Cosh, ""))
 # ``y' = (1 -+ y^2) u'``.
 OWN_SQUARE = {Tanh: -1, Tan: 1}
 
