@@ -273,8 +273,8 @@ NEAREST = {
     "hybrid/expression/nodes.py": ("expression/test_operations.py", "expression/test_derivatives.py"),
     "hybrid/expression/operations.py": ("expression/test_derivatives.py", "compiler/taylor/test_series.py"),
     "hybrid/expression/tracing.py": ("expression/test_values.py",),
-    "hybrid/expression/ufuncs.py": ("expression/test_tracing.py", "compiler/test_operations.py"),
-    "hybrid/expression/values.py": ("expression/test_tracing.py", "compiler/test_operations.py"),
+    "hybrid/expression/ufuncs.py": ("expression/test_tracing.py", "compiler/test_traced.py"),
+    "hybrid/expression/values.py": ("expression/test_tracing.py", "compiler/test_traced.py"),
     "hybrid/system/functions.py": (
         "system/test_derivatives.py",
         "system/test_elements.py",

@@ -17,9 +17,9 @@ from hybrid.compiler.agreement import check_agreement
 from hybrid.compiler.cache import store
 from hybrid.compiler.cache.folder import announced
 from hybrid.compiler.cache.loader import Absent, load_kernels
-from hybrid.compiler.operations import operations_of
 from hybrid.compiler.parts import EVENTS, FIELDS, SERIES, TANGENT_SERIES, VARIATIONAL
 from hybrid.compiler.surfaces import is_paired
+from hybrid.compiler.traced import key_of
 from hybrid.errors import ArgumentError, ModelError
 from hybrid.kernels.types.codes import DESINGULARISED, NARROW, NO_MODE, ROOTED, RUNGE_KUTTA
 from hybrid.kernels.types.layout import Model, Programs
@@ -422,14 +422,15 @@ def _watched(system: HybridSystem) -> Watched:
 
 def emitted_of(system: HybridSystem) -> Emitted:
     """The result of `emit` for a system, computed now or stored by an earlier process."""
-    operations = operations_of(system)
-    found = None if operations is None else store.read(operations)
+    traces = {} if system.growth is None else system.growth.written
+    key = key_of(system, traces)
+    found = None if key is None else store.read(key)
     if found is not None:
         return found
-    # What traces is imported only now.
+    # What derives and writes is imported only now.
     from hybrid.compiler.emit import emit
 
-    emitted = emit(system)
-    if operations is not None and not emitted.opaque:
-        store.write(operations, emitted)
+    emitted = emit(system, traces)
+    if key is not None and not emitted.opaque:
+        store.write(key, emitted)
     return emitted

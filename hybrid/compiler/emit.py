@@ -32,18 +32,19 @@ from hybrid.compiler.readers import is_free, readers
 from hybrid.compiler.steep import fields_at_crossings, steep_at_guards, steep_inside
 from hybrid.compiler.surfaces import surfaces
 from hybrid.compiler.taylor.loops import padded
+from hybrid.compiler.traced import Traces, expressions_of, period_of
 from hybrid.compiler.written import Written, beyond_guards, variational
 from hybrid.errors import ModelError
 from hybrid.expression.code import IMPORTS, assignments, unprintable
 from hybrid.expression.continuity import jumps_of, may_be_abrupt, may_jump
 from hybrid.expression.derivatives import jacobian_of
 from hybrid.expression.graph import forget, nodes_of
-from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol, node
+from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol
 from hybrid.expression.operations import JUMPING
 from hybrid.expression.periodicity import is_periodic
 from hybrid.expression.signs import simplified
 from hybrid.expression.text import text
-from hybrid.expression.tracing import Symbols, TraceError, model_symbols, trace
+from hybrid.expression.tracing import Symbols, TraceError, model_symbols
 from hybrid.kernels.types.codes import WIDE
 from hybrid.system.checks import derivative_has_time_column
 from hybrid.system.derivatives import complex_step_error
@@ -65,8 +66,10 @@ Result = TypeVar("Result")
 _INDEXED = re.compile(r"\b[xp]\[\d+\]")
 
 
-def emit(system: HybridSystem) -> Emitted:
+def emit(system: HybridSystem, traces: Traces | None = None) -> Emitted:
     """Trace and differentiate every function of a system, and write the source of what is compiled.
+
+    ``traces`` holds what has been traced before.
 
     Raises
     ------
@@ -75,13 +78,13 @@ def emit(system: HybridSystem) -> Emitted:
         a derivative.
     """
     try:
-        return _emitted(system)
+        return _emitted(system, {} if traces is None else traces)
     finally:
         forget()
 
 
-def _emitted(system: HybridSystem) -> Emitted:
-    writer = _Writer(system)
+def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
+    writer = _Writer(system, traces)
     fields = [writer.write(field_function(mode, system.dimension)) for mode in system.modes]
     guards = [writer.write(guard_function(transition)) for transition in system.transitions]
     conditions = [_written_condition(writer, transition) for transition in system.transitions]
@@ -250,8 +253,8 @@ def _without_text(propagator: Propagator) -> Propagator:
 class _Writer:
     """Writes the statements of model functions, and gathers those that stay opaque."""
 
-    def __init__(self, system: HybridSystem) -> None:
-        self.system = system
+    def __init__(self, system: HybridSystem, traces: Traces) -> None:
+        self.system, self.traces = system, traces
         self.symbols: Symbols = model_symbols(system.dimension, len(system.parameters))
         self.opaque: dict[str, OpaqueFunction] = {}
         # A system that grows has most of its functions from its last stage.
@@ -274,7 +277,7 @@ class _Writer:
     def _write(self, function: ModelFunction) -> Written:
         targets = ["out[0]"] if function.size is None else [f"out[{i}]" for i in range(function.size)]
         try:
-            expressions = self.traced(function.value)
+            expressions = self.traced(function)
             jacobian = jacobian_of(expressions, self.symbols.variables)
             _check_printable(entry for row in jacobian for entry in row if entry is not ZERO)
         except ModelError as error:
@@ -282,7 +285,7 @@ class _Writer:
         if function.derivative is None:
             derivative = assignments(self._cells(function), [entry for row in jacobian for entry in row])
         else:
-            derivative = self._given_derivative(function, function.derivative)
+            derivative = self._given_derivative(function)
         given = function.derivative is not None
         return Written(assignments(targets, expressions), derivative, expressions, jacobian, given)
 
@@ -292,7 +295,7 @@ class _Writer:
 
     def _condition(self, function: ModelFunction) -> Written:
         try:
-            [value] = self.traced(function.value)
+            [value] = self.traced(function)
         except ModelError as reason:
             return Written(self._opaque_value(function, ["out[0]"], reason), [])
         return Written(assignments(["out[0]"], [value]), [], [value])
@@ -313,16 +316,16 @@ class _Writer:
         entries = [ONE if i == j else ZERO for i in range(n) for j in range(n + 1)]
         return Written(value, assignments(cells, entries), [*self.symbols.x])
 
-    def traced(self, function: Callable[..., Any]) -> list[Expression]:
-        """Expressions of a function; ModelError if it has none that can be compiled."""
-        expressions = trace(function, self.system.state, tuple(self.system.parameters))
+    def traced(self, function: ModelFunction, *, derivative: bool = False) -> list[Expression]:
+        """Expressions of a function or of its derivative; ModelError if it has none that can be compiled."""
+        expressions = expressions_of(self.system, function, self.traces, derivative=derivative)
         _check_printable(expressions)
         return expressions
 
     def _write_opaque(self, function: ModelFunction, targets: Sequence[str], reason: ModelError) -> Written:
         value = self._opaque_value(function, targets, reason)
         if function.derivative is not None:
-            return Written(value, self._given_derivative(function, function.derivative))
+            return Written(value, self._given_derivative(function))
         error = complex_step_error(self.system.variables, function)
         if error is not None:
             raise ModelError(
@@ -344,10 +347,10 @@ class _Writer:
         lines += [f"{next(cells)} = r{j}[{i}]" for i in range(function.rows) for j in range(columns)]
         return lines
 
-    def _given_derivative(self, function: ModelFunction, derivative: Callable[..., Any]) -> list[str]:
+    def _given_derivative(self, function: ModelFunction) -> list[str]:
         n, cells = self.system.dimension, self._cells(function)
         try:
-            entries = self.traced(derivative)
+            entries = self.traced(function, derivative=True)
         except ModelError as reason:
             return self._opaque_derivative(function, reason)
         width = len(entries) // function.rows
@@ -452,17 +455,11 @@ def _has_proved_period(system: HybridSystem, written: Iterable[Written], writer:
     """Whether all traced functions are proved to have the declared period, at any parameters."""
     if system.period is None:
         return True
-    period: Any = system.period
-    symbols = writer.symbols
-    if callable(period):
-        try:
-            [period] = writer.traced(lambda t, x, p: system.period(p))  # type: ignore[operator,misc]
-        except ModelError:
-            return False
-    return all(
-        each.expressions is not None and is_periodic(each.expressions, symbols.t, node(period))
-        for each in written
-    )
+    period = period_of(system, writer.traces)
+    if period is None:
+        return False
+    t = writer.symbols.t
+    return all(each.expressions is not None and is_periodic(each.expressions, t, period) for each in written)
 
 
 def _guards_in_series(system: HybridSystem, propagators: Sequence[Propagator]) -> tuple[bool, ...]:

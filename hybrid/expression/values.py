@@ -1,9 +1,9 @@
 """Placeholders for numbers, which record the Python operators and NumPy functions applied to them.
 
 Operators and functions on a traced number build a record instead of computing (NEP 13 and NEP 18). An algebra
-determines the record: expressions in ``hybrid.expression.tracing``, or a plain list of operations in
-``hybrid.compiler.operations``. Model functions behave the same with both. Neither
-algebra can follow a branch taken in Python, because the value it depends on is unknown.
+determines the record: expressions in ``hybrid.expression.tracing``, the names that are read in
+``hybrid.expression.reads``. Model functions behave the same with all. None can follow a branch taken in
+Python, because the value it depends on is unknown.
 """
 
 from __future__ import annotations

@@ -27,19 +27,19 @@ def kept_of_model(file: str) -> bytes | None:
     return kept(path_in_cache(f"models-{_compiler()}", file))
 
 
-def read(operations: str) -> Emitted | None:
-    """Stored results of tracing the system with these operations; None if missing or damaged."""
-    return _read(kept_of_model(_file(operations)))
+def read(key: str) -> Emitted | None:
+    """What was found out about the system of this key; None if missing or damaged."""
+    return _read(kept_of_model(_file(key)))
 
 
-def write(operations: str, emitted: Emitted) -> None:
-    """Store the results of tracing the system with these operations."""
+def write(key: str, emitted: Emitted) -> None:
+    """Store what was found out about the system of this key."""
     text = json.dumps(_converter().unstructure(emitted), default=int)
-    keep(models_folder() / _file(operations), text.encode())
+    keep(models_folder() / _file(key), text.encode())
 
 
-def _file(operations: str) -> str:
-    return f"emitted_{_digest(operations)}.json"
+def _file(key: str) -> str:
+    return f"emitted_{_digest(key)}.json"
 
 
 @cache
@@ -48,8 +48,8 @@ def _compiler() -> str:
     return source_key(kernels_key(), *(path.read_text(encoding="utf-8") for path in paths))
 
 
-def _digest(operations: str) -> str:
-    return hashlib.sha256(f"{_tracer()}\n{operations}".encode()).hexdigest()
+def _digest(key: str) -> str:
+    return hashlib.sha256(f"{_tracer()}\n{key}".encode()).hexdigest()
 
 
 @cache
