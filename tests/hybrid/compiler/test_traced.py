@@ -104,13 +104,6 @@ def test_closures():
     assert_all_differ([oscillator(field(value)) for value in (1.0, np.nextafter(1.0, 2.0), -1.0)])
 
 
-def test_signs_of_zero():
-    def field(offset):
-        return lambda t, x, p: (x.v, offset - x.q)
-
-    assert_all_differ([oscillator(field(0.0)), oscillator(field(-0.0))])
-
-
 STIFFNESS = 1.0
 TABLE = np.array([1.0, 2.0])
 
