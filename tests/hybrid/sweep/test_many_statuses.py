@@ -111,9 +111,10 @@ SWING = alone(
     Transition("m", "m", Guard(opaque, -1, gradient=lambda t, x, p: (1.0, 0.0)), name="mark"),
     state=("q", "v"),
 )
-# Comes to rest at a double root of the guard.
+# Comes to rest at a fourfold root of the guard.
 NEAR_ZERO = alone(
-    lambda t, x, p: (-x.x,), Transition("m", "m", Guard(lambda t, x, p: np.exp(x.x) - 1.0 - x.x, -1))
+    lambda t, x, p: (-x.x,),
+    Transition("m", "m", Guard(lambda t, x, p: np.cosh(x.x) - 1.0 - 0.5 * x.x**2, -1)),
 )
 # Hardly wider than the rounding of the time.
 PULSE = HybridSystem(
