@@ -67,8 +67,8 @@ class Expression:
     size
         Operations of the expression written out as a tree.
     order
-        Where it stands among the terms of a sum: symbols first, in the order of time, states and parameters.
-        It does not depend on what else has been computed.
+        Where it stands among the terms of a sum: by its first symbol, in the order of time, states and
+        parameters, by its size, by its numbers. It does not depend on what else has been computed.
     """
 
     __slots__ = ("__weakref__", "args", "mask", "order", "size", "traits")
@@ -77,7 +77,7 @@ class Expression:
     mask: int
     traits: int
     size: int
-    order: tuple[int, int, int]
+    order: tuple[int, int, float, int]
 
     is_number: ClassVar[bool] = False
     is_symbol: ClassVar[bool] = False
@@ -105,23 +105,19 @@ class Expression:
         def __float__(self) -> float: ...
 
     def _begin(self, *args: Any) -> None:
-        mask, traits, size, first, word = (
-            0,
-            self.own_traits,
-            max(1, len(args) - 1),
-            LAST,
-            crc32(type(self).__name__.encode()),
-        )
+        mask, traits, size = 0, self.own_traits, max(1, len(args) - 1)
+        first, numbers, word = LAST, 0.0, crc32(type(self).__name__.encode())
         for each in args:
             mask |= each.mask
             traits |= each.traits
             size += each.size
             first = min(first, each.order[0])
-            word = (word * 0x9E3779B97F4A7C15 + each.order[2]) & WORD
+            numbers += each.order[2]
+            word = (word * 0x9E3779B97F4A7C15 + each.order[3]) & WORD
             word ^= word >> 29
         self.args, self.mask, self.traits = args, mask, traits
         self.size = min(size, COUNTLESS)
-        self.order = first, self.size, word
+        self.order = first, self.size, numbers if math.isfinite(numbers) else 0.0, word
 
     def rebuilt(self, args: Sequence[Expression]) -> Expression:
         """The same operation on other nodes."""
@@ -196,7 +192,8 @@ class Number(Expression):
         kind, value = args
         self.value = kind(value)
         self.args, self.mask, self.traits, self.size = (), 0, 0, 0
-        self.order = LAST, 0, crc32(float(self.value).hex().encode())
+        number = float(self.value)
+        self.order = LAST, 0, number if math.isfinite(number) else 0.0, crc32(number.hex().encode())
 
     def __float__(self) -> float:
         return float(self.value)
@@ -237,7 +234,7 @@ class Symbol(Expression):
         self.args, self.traits, self.size = (), 0, 0
         self.mask = 1 << len(Symbol.known)
         Symbol.known.append(self)
-        self.order = _place(label), 0, crc32(label.encode())
+        self.order = _place(label), 0, 0.0, crc32(label.encode())
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Symbol, (self.label, self.positive)
@@ -383,7 +380,7 @@ def add(*terms: Expression) -> Expression:
     return parts[0] if parts else ZERO
 
 
-def order_of(part: Expression) -> tuple[int, int, int]:
+def order_of(part: Expression) -> tuple[int, int, float, int]:
     """The key by which terms and factors are sorted."""
     return part.order
 

@@ -18,7 +18,6 @@ from hybrid.expression.graph import (
     all_replaced,
     base_and_exponent,
     contains,
-    factors_of,
     is_larger_than,
     mentions,
     nodes_of,
@@ -264,9 +263,11 @@ class Switches:
 
     def _simpler(self, height: Expression, used: Mapping[int, int]) -> tuple[Expression, int]:
         """A height without the factors whose signs are known on some sides, and these signs' product."""
+        if not height.is_product:
+            return height, 1
         given = [(self.surfaces.known[number].height, side) for number, side in used.items()]
         kept, sign = [], 1
-        for factor in factors_of(height):
+        for factor in height.args:
             base, exponent = base_and_exponent(factor)
             whole = isinstance(exponent, Number) and exponent.is_whole
             even = whole and exponent.value % 2 == 0
