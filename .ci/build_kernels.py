@@ -17,7 +17,7 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-NEEDED = {"attrs", "llvmlite", "numba", "numpy", "platformdirs", "tqdm"}
+NEEDED = {"attrs", "cattrs", "llvmlite", "numba", "numpy", "platformdirs", "tqdm"}
 
 
 class Kernels(BuildHookInterface):
