@@ -172,7 +172,8 @@ class _Recorder:
             # Compiled before the run, not in the middle of it, where an interrupt would meet the compiler.
             load_kernels("hybrid.kernels.steps.dense")
         n, degree = trajectory.model.dimension, trajectory.plan.degree
-        self.layout = record_layout(n, degree, self.steps_at_once, JUMPS_AT_ONCE)
+        jumps_at_once = JUMPS_AT_ONCE if keeps_jumps else 0
+        self.layout = record_layout(n, degree, self.steps_at_once, jumps_at_once)
         self.steps: list[tuple[np.ndarray, ...]] = []
         self.blocks: list[np.ndarray] = []
         self.jumps: list[tuple[np.ndarray, ...]] = []
