@@ -18,6 +18,7 @@ from hybrid.expression.graph import (
     all_replaced,
     base_and_exponent,
     contains,
+    factors_of,
     is_larger_than,
     mentions,
     nodes_of,
@@ -30,7 +31,6 @@ from hybrid.expression.operations import (
     Ceiling,
     Cos,
     Equal,
-    Exp,
     Floor,
     Less,
     LessEqual,
@@ -252,33 +252,43 @@ class Switches:
             if branch is None:
                 height, argument = _height(atom)
                 height, sign = self._simpler(height, used)
-                place, orientation = self.surfaces.find(height, argument)
-                orientation *= sign
-                if place not in used:
-                    entries = tuple(map(_without_truths, entries))
-                    return _Stage(entries, used, atom, place, orientation)
-                branch = _branch(atom, used[place] * orientation)
+                if height is not ONE:
+                    place, orientation = self.surfaces.find(height, argument)
+                    sign *= orientation
+                    if place not in used:
+                        return _Stage(tuple(map(_without_truths, entries)), used, atom, place, sign)
+                    sign *= used[place]
+                branch = _branch(atom, sign)
             entries = tuple(all_replaced(entries, {atom: branch}))
         return _Stage(tuple(map(_without_truths, entries)), used)
 
     def _simpler(self, height: Expression, used: Mapping[int, int]) -> tuple[Expression, int]:
-        """A height without the factors whose signs are known on some sides, and these signs' product."""
-        if not height.is_product:
-            return height, 1
+        """What of a height decides its sign, and the sign of the rest: no factor of known sign, no odd power.
+
+        If no factor is left, the height never changes its sign, though it may touch zero.
+        """
         given = [(self.surfaces.known[number].height, side) for number, side in used.items()]
         kept, sign = [], 1
-        for factor in height.args:
+        for factor in factors_of(height):
+            known = _sign(factor, given if height.is_product else [])
             base, exponent = base_and_exponent(factor)
-            whole = isinstance(exponent, Number) and exponent.is_whole
-            even = whole and exponent.value % 2 == 0
-            if even or isinstance(factor, Exp) or follows(base, 1, given):
-                continue
-            found = range_of(factor)
-            if whole and (found.negative or follows(base, -1, given)):
-                sign = -sign
-            elif not found.positive:
-                kept.append(factor)
-        return (multiply(*kept), sign) if kept else (height, 1)
+            if known:
+                sign *= known
+            else:
+                kept.append(base if isinstance(exponent, Number) and exponent.is_whole else factor)
+        return multiply(*kept), sign
+
+
+def _sign(factor: Expression, given: Sequence[tuple[Expression, int]]) -> int:
+    """The sign of a factor wherever it is not zero; 0 if it is not known."""
+    found = range_of(factor)
+    if found.low.value >= 0.0 or found.high.value <= 0.0:
+        return 1 if found.low.value >= 0.0 else -1
+    base, exponent = base_and_exponent(factor)
+    if follows(base, 1, given):
+        return 1
+    whole = isinstance(exponent, Number) and exponent.is_whole
+    return -1 if whole and follows(base, -1, given) else 0
 
 
 def switching_names(entries: Sequence[Expression], symbols: Symbols) -> list[str]:
@@ -450,4 +460,6 @@ def _guarded(expression: Expression, heights: Sequence[Expression]) -> Expressio
 
 
 def _is_multiple(base: Expression, heights: Sequence[Expression]) -> bool:
-    return any(ratio(base, height) is not None for height in heights)
+    """Whether a base, or a factor of it, vanishes where a height does."""
+    parts = [base, *(base_and_exponent(factor)[0] for factor in factors_of(base))]
+    return any(ratio(part, height) is not None for part in parts for height in heights)

@@ -48,6 +48,46 @@ def test_a_switch_that_is_decided_makes_no_modes(rate, wanted):
     np.testing.assert_allclose(arc.x[-1], wanted + (0.7 - wanted) * np.exp(-3.0), rtol=1e-9)
 
 
+@pytest.mark.parametrize(
+    "rate",
+    [
+        lambda q: np.abs(q**2) - q * q - q,
+        lambda q: np.maximum(q**2 + 0.25, 0) - q * q - 0.25 - q,
+        lambda q: -np.sqrt(np.abs(1 + q**4)) * q / np.sqrt(1 + q**4),
+        lambda q: -np.where(np.exp(-q) > 0, 1.0, 2.0) * q,
+        lambda q: -np.sign(1 + 0.8 * np.cos(3 * q)) * q,
+        lambda q: np.minimum(-(q**2), 0) + q * q - q,
+    ],
+)
+def test_a_height_that_never_changes_its_sign_makes_no_modes(rate):
+    system = from_equations(lambda t, x, p: (rate(x.q),), state=("q",))
+    assert system.mode_names == ("smooth",)
+    arc = simulate(system, (0.7,), (0.0, 3.0))
+    np.testing.assert_allclose(arc.x[-1], 0.7 * np.exp(-3.0), rtol=1e-8)
+
+
+@pytest.mark.parametrize("height", [lambda v: v**3, lambda v: 1 / v, lambda v: v**5 * (1 + v**2)])
+def test_an_odd_power_changes_its_sign_where_its_base_does(height):
+    """The block slows down, then sticks: the spring is weaker than friction."""
+    field = lambda t, x, p: (x.v, -0.1 * x.q - np.sign(height(x.v)))  # noqa: E731
+    block = from_equations(field, state=("q", "v"))
+    assert sorted(block.mode_names) == ["v<0", "v=0", "v>0"]
+    arc = simulate(block, (0.0, 1.0), (0.0, 3.0))
+    plain = from_equations(lambda t, x, p: (x.v, -0.1 * x.q - np.sign(x.v)), state=("q", "v"))
+    np.testing.assert_allclose(arc.x[-1], simulate(plain, (0.0, 1.0), (0.0, 3.0)).x[-1], rtol=1e-12)
+    assert arc.mode[-1] == "v=0"
+
+
+def test_a_root_of_a_cube_is_zero_beyond_its_surface():
+    field = lambda t, x, p: (x.v, -5 * np.sqrt(np.maximum(x.q**3, 0)) - 1)  # noqa: E731
+    other = lambda t, x, p: (x.v, -5 * np.maximum(x.q, 0) ** 1.5 - 1)  # noqa: E731
+    found, wanted = (
+        simulate(from_equations(each, state=("q", "v")), (-1.0, 2.0), (0.0, 4.0)) for each in (field, other)
+    )
+    assert len(found.jumps) == len(wanted.jumps) == 2
+    np.testing.assert_allclose(found.x[-1], wanted.x[-1], rtol=1e-9)
+
+
 @pytest.mark.parametrize("offset", [0.0, 0.7, -5.3])
 @pytest.mark.parametrize(("period", "share"), [(4.0, 0.5), (4.0, 0.25), (2.0, 0.825), (3.0, 1e-3)])
 def test_a_duty_cycle_has_two_modes(period, share, offset):
