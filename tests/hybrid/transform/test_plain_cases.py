@@ -129,3 +129,33 @@ def test_levels_of_one_fraction():
     assert len(system.modes) == 3
     arc = simulate(system, (0.0,), (0.0, 8.0), parameters={"T": 2.0})
     np.testing.assert_allclose(arc.x[-1], 4 * (0.5 * 1.0 + 0.5 * 2.0), rtol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("wave", "modes", "mean"),
+    [
+        (lambda t: np.abs(np.mod(t, 2.0) - 1), 2, 0.5),
+        (lambda t: np.abs(np.mod(-t, 2.0) - 1), 2, 0.5),
+        (lambda t: 2 * np.abs(t / 2 - np.floor(t / 2 + 0.5)), 2, 0.5),
+        (lambda t: 2 * np.minimum(np.mod(t / 2, 1), 0.25), 3, 0.4375),
+        (lambda t: np.where(np.mod(t / 2, 1) < 0.3, np.mod(t / 2, 1), 0), 2, 0.045),
+        (lambda t: np.where(np.mod(t, 2) < 0.6, 1, 0) + np.where(np.mod(t, 2) < 1.2, 1, 0), 3, 0.9),
+        (lambda t: np.clip(3 * np.abs(np.mod(t, 2) - 1) - 1, 0, 1), 6, 0.5),
+    ],
+)
+def test_a_wave_has_no_modes_where_its_fraction_cannot_be(wave, modes, mean):
+    system = from_equations(lambda t, x, p: (wave(t) + 0 * x.q,), state=("q",))
+    assert len(system.modes) == modes
+    arc = simulate(system, (0.0,), (0.3, 14.3))
+    assert arc.status.ok
+    np.testing.assert_allclose(arc.x[-1], 14 * mean, rtol=1e-12)
+
+
+@pytest.mark.parametrize("factor", [3.0, -3.0])
+@pytest.mark.parametrize("rounded", [np.floor, np.ceil])
+@pytest.mark.parametrize("q", [0.1, 0.2, -0.1, -0.2])
+def test_the_name_of_a_step_is_true(factor, rounded, q):
+    system = from_equations(lambda t, x, p: (rounded(factor * x.q),), state=("q",))
+    [name] = {*simulate(system, (q,), (0.0, 1e-6)).mode}
+    half = ">" if q * 3.0 % 1 > 0.5 else "<"
+    assert name == f"mod(3*q,1){half}1/2"
