@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import attrs
 
-from hybrid.expression.graph import is_larger_than
+from hybrid.expression.graph import is_larger_than, mentions
 from hybrid.expression.implications import MOST_TERMS, follows
-from hybrid.expression.nodes import HALF, ONE, Expression, number
+from hybrid.expression.nodes import HALF, ONE, Expression, Symbol, number
 from hybrid.expression.operations import Floor, Level
 from hybrid.expression.polynomials import coefficients_of
 from hybrid.expression.text import text
@@ -162,3 +162,20 @@ def core_of(height: Expression, symbols: Symbols) -> tuple[str, float, int]:
     factor = terms[0][1] if leading is None else leading
     core = " + ".join(f"{each / factor:.{DIGITS}e}*{term}" for term, each in terms)
     return core, -constant / factor, 1 if factor > 0 else -1
+
+
+def moves(expression: Expression, variables: Collection[Symbol]) -> bool:
+    """Whether an expression changes with variables, other than by jumps of floors to their next levels.
+
+    What changes by such jumps alone has no surface of its own, and may be zero on whole steps.
+    """
+    waiting, seen = [expression], {expression}
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, Level) or not mentions(node, variables):
+            continue
+        if node.is_symbol:
+            return True
+        waiting += [each for each in node.args if each not in seen]
+        seen.update(node.args)
+    return False

@@ -58,7 +58,7 @@ from hybrid.expression.operations import (
 )
 from hybrid.expression.polynomials import expanded, ratio
 from hybrid.expression.ranges import range_of
-from hybrid.expression.surfaces import QUARTER, Surfaces, core_of
+from hybrid.expression.surfaces import QUARTER, Surfaces, core_of, moves
 from hybrid.expression.tracing import Symbols
 
 COMPARISONS = (Less, LessEqual, Equal)
@@ -186,12 +186,8 @@ def _sign(factor: Expression, given: Sequence[tuple[Expression, int]]) -> int:
 
 def switching_names(entries: Sequence[Expression], symbols: Symbols) -> list[str]:
     """Names of the switching functions of the state or of time in expressions."""
-    found = {type(atom).__name__ for atom in nodes_of(SWITCHING, *entries) if _switches(atom, symbols)}
+    found = {type(atom).__name__ for atom in nodes_of(SWITCHING, *entries) if moves(atom, symbols.variables)}
     return sorted(found)
-
-
-def _switches(atom: Expression, symbols: Symbols) -> bool:
-    return not isinstance(atom, Level) and mentions(atom, symbols.variables)
 
 
 def _first_atom(entries: Sequence[Expression], symbols: Symbols) -> Expression | None:
@@ -205,7 +201,7 @@ def _first_atom(entries: Sequence[Expression], symbols: Symbols) -> Expression |
             found = search(argument)
             if found is not None:
                 return found
-        if isinstance(node, SWITCHING) and _switches(node, symbols):
+        if isinstance(node, SWITCHING) and moves(node, symbols.variables):
             return node
         clean.add(node)
         return None

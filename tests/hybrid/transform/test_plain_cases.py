@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hybrid import from_equations, simulate
+from hybrid import compile_system, from_equations, simulate
 
 OUTER = [
     np.sin,
@@ -159,3 +159,34 @@ def test_the_name_of_a_step_is_true(factor, rounded, q):
     [name] = {*simulate(system, (q,), (0.0, 1e-6)).mode}
     half = ">" if q * 3.0 % 1 > 0.5 else "<"
     assert name == f"mod(3*q,1){half}1/2"
+
+
+@pytest.mark.parametrize(
+    ("rate", "wanted"),
+    [
+        (lambda n: np.where(n == 2, 1.0, 0.0), 1.0),
+        (lambda n: np.where(n != 2, 1.0, 0.0), 5.25),
+        (lambda n: np.where(n > 2, 1.0, 0.0), 3.25),
+        (lambda n: np.where(n >= 2, 1.0, 0.0), 4.25),
+        (lambda n: np.where(np.mod(n, 2) == 0, 1.0, -1.0), 0.25),
+        (lambda n: np.where(np.mod(n, 2) < 0.5, 1.0, -1.0), 0.25),
+        (lambda n: np.floor(n / 2), 6.75),
+        (lambda n: np.mod(n, 3), 6.0),
+        (lambda n: np.sign(n - 1), 3.25),
+        (lambda n: np.select([n == 0, n == 1], [3.0, 2.0], 1.0), 9.25),
+    ],
+)
+def test_choices_by_a_floor_change_with_it(rate, wanted):
+    system = from_equations(lambda t, x, p: (rate(np.floor(t)) + 0 * x.q,), state=("q",))
+    assert set(system.mode_names) == {"mod(t,1)<1/2", "mod(t,1)>1/2"}
+    arc = simulate(system, (0.0,), (0.0, 6.25))
+    np.testing.assert_allclose(arc.x[-1], wanted, rtol=1e-9)
+
+
+def test_choices_by_a_floor_of_the_state():
+    """Gears: each has its own acceleration."""
+    gear = lambda v: np.where(np.floor(v) == 0, 4.0, np.where(np.floor(v) == 1, 2.0, 1.0))  # noqa: E731
+    car = from_equations(lambda t, x, p: (gear(x.v),), state=("v",))
+    arc = simulate(car, (0.0,), (0.0, 1.75))
+    np.testing.assert_allclose(arc.x[-1], 3.0, rtol=1e-9)
+    assert "jumps" not in repr(compile_system(car))
