@@ -40,7 +40,6 @@ from hybrid.expression.operations import (
     Floor,
     Less,
     LessEqual,
-    Level,
     Log,
     Not,
     Or,
@@ -57,6 +56,7 @@ from hybrid.expression.operations import (
 )
 from hybrid.expression.polynomials import coefficients_of, expanded, ratio
 from hybrid.expression.ranges import has_one_sign, range_of
+from hybrid.expression.surfaces import moves
 from hybrid.expression.text import text
 
 # Functions that change by their derivatives, other than sums, products and positive powers.
@@ -85,7 +85,7 @@ def _surfaces(entry: Expression, states: Sequence[Symbol]) -> list[str]:
         return []
     quotients = nodes_of(WholeQuotient, entry)
     entry = replaced(entry, {each: Floor(each.args[0] / each.args[1]) for each in quotients})
-    jumps = (node for node in nodes_of(JUMPS, entry) if mentions(node, states) and _may_jump(node))
+    jumps = (node for node in nodes_of(JUMPS, entry) if moves(node, states) and _may_jump(node))
     atoms = sorted(jumps, key=order_of)
     names = {atom: Symbol(f"jump {i}") for i, atom in enumerate(atoms)}
     return [_told(atom) for atom in atoms if not _is_continuous(entry, atom, names)]
@@ -93,8 +93,6 @@ def _surfaces(entry: Expression, states: Sequence[Symbol]) -> list[str]:
 
 def _may_jump(atom: Expression) -> bool:
     """Whether an atom may have surfaces where it jumps: an angle turns only left of the origin."""
-    if isinstance(atom, Level):
-        return False
     if isinstance(atom, Atan2) and range_of(atom.args[1]).positive:
         return False
     surface, _ = _sides(atom, ZERO)

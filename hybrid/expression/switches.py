@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import attrs
 
@@ -18,19 +17,29 @@ from hybrid.expression.graph import (
     all_replaced,
     base_and_exponent,
     contains,
+    factors_of,
     is_larger_than,
     mentions,
     nodes_of,
     replaced,
 )
 from hybrid.expression.implications import MOST_TERMS, follows
-from hybrid.expression.nodes import ONE, ZERO, Expression, Number, Power, Symbol, multiply, number, power
+from hybrid.expression.nodes import (
+    ONE,
+    ZERO,
+    Expression,
+    Number,
+    Power,
+    Symbol,
+    multiply,
+    number,
+    power,
+)
 from hybrid.expression.operations import (
     Absolute,
     Ceiling,
     Cos,
     Equal,
-    Exp,
     Floor,
     Less,
     LessEqual,
@@ -47,131 +56,14 @@ from hybrid.expression.operations import (
     Truth,
     WholeQuotient,
 )
-from hybrid.expression.polynomials import coefficients_of, expanded, ratio
+from hybrid.expression.polynomials import expanded, ratio
 from hybrid.expression.ranges import range_of
-from hybrid.expression.text import text
+from hybrid.expression.surfaces import QUARTER, Surfaces, core_of, moves
 from hybrid.expression.tracing import Symbols
 
 COMPARISONS = (Less, LessEqual, Equal)
 COUNTS = (Floor, Ceiling, Truncate, WholeQuotient, Remainder, TruncatedRemainder)
 SWITCHING = (*COMPARISONS, *COUNTS, Sign, Step, Absolute, Maximum, Minimum)
-QUARTER = number(0.25)
-# Digits to which coefficients of surfaces are compared.
-DIGITS = 12
-
-
-# What a surface that is both ends of a pulse keeps: see ``Surface.pulse``.
-Pulse = tuple[Expression, Expression, int]
-
-
-@attrs.frozen
-class Surface:
-    """A surface ``height = 0``.
-
-    Attributes
-    ----------
-    height
-        Positive above the surface, negative below it.
-    core, level
-        The surface lies where ``core``, a sum without constant that is written down as text, has the value
-        ``level``. Surfaces with the same core are parallel. The height grows with the core.
-    argument
-        For a floor its argument, whose fraction is below 1/2 above the surface; else None.
-    pulse
-        For both ends of a pulse, ``u``, ``d`` and the side on which the fraction of ``u`` exceeds ``d``.
-    """
-
-    height: Expression
-    core: str
-    level: float
-    argument: Expression | None = None
-    pulse: Pulse | None = None
-
-
-class Surfaces:
-    """The surfaces that have been found so far, numbered; a surface that is written twice is one."""
-
-    def __init__(self, symbols: Symbols) -> None:
-        self.symbols = symbols
-        self.known: list[Surface] = []
-        self.pulses: dict[str, Pulse] = {}
-        self._implied: dict[Any, int | None] = {}
-
-    def find(self, height: Expression, argument: Expression | None = None) -> tuple[int, int]:
-        """Number of the surface where an expression vanishes, and 1 if it is positive above, else -1."""
-        core, level, orientation = _core(height, self.symbols)
-        number = self._number(core, level)
-        if number is not None:
-            return number, orientation
-        upwards = height if orientation > 0 else -height
-        self.known.append(Surface(upwards, core, level, argument, self.pulses.get(core)))
-        return len(self.known) - 1, orientation
-
-    def match(self, height: Expression) -> tuple[int, int] | None:
-        """As `find`, but None if the surface has not been found before."""
-        core, level, orientation = _core(height, self.symbols)
-        number = self._number(core, level)
-        return None if number is None else (number, orientation)
-
-    def _number(self, core: str, level: float) -> int | None:
-        for place, surface in enumerate(self.known):
-            close = abs(surface.level - level) <= 10.0**-DIGITS * max(abs(level), abs(surface.level))
-            if surface.core == core and close:
-                return place
-        return None
-
-    def implied(self, number: int, sides: Mapping[int, int]) -> int | None:
-        """The side of a surface that the sides of other surfaces imply; None if they imply none.
-
-        Parameters
-        ----------
-        sides
-            By number of a surface: -1 below, 1 above, 0 on it; -2 and 2 on it, with the branch of that side.
-        """
-        nearest = self._nearest(number, sides)
-        key = number, frozenset(nearest.items())
-        if key not in self._implied:
-            given = [(self.known[other].height, side) for other, side in nearest.items()]
-            surface = self.known[number]
-            side = self._by_parallels(surface, nearest)
-            found = (each for each in (1, -1) if follows(surface.height, each, given))
-            self._implied[key] = side or next(found, None)
-        return self._implied[key]
-
-    def _nearest(self, number: int, sides: Mapping[int, int]) -> dict[int, int]:
-        """The sides of the other surfaces, of parallel ones only those that say most."""
-        found: dict[tuple[str, int], tuple[float, int, int]] = {}
-        for other, side in sides.items():
-            if other == number:
-                continue
-            surface, direction = self.known[other], side if side in (-1, 1) else 0
-            bound = direction * surface.level, other, side
-            found[surface.core, direction] = max(found.get((surface.core, direction), bound), bound)
-        return {other: side for _, other, side in found.values()}
-
-    def _by_parallels(self, surface: Surface, sides: Mapping[int, int]) -> int | None:
-        """The side of a surface that those of parallel ones imply."""
-        for other, side in sides.items():
-            beside = self.known[other]
-            above = beside.level - surface.level
-            if beside.core == surface.core and (above > 0 or side == 1) and above >= 0 and side != -1:
-                return 1
-            if beside.core == surface.core and (above < 0 or side == -1) and above <= 0 and side != 1:
-                return -1
-        return None
-
-
-def _core(height: Expression, symbols: Symbols) -> tuple[str, float, int]:
-    """Text of a height without its constant and leading factor, the level, and the sign of the factor."""
-    if is_larger_than(MOST_TERMS, height):
-        return text(height), 0.0, 1
-    coefficients = dict(coefficients_of(height))
-    constant = float(coefficients.pop(ONE, 0))
-    leading = next((float(coefficients[x]) for x in symbols.x if x in coefficients), None)
-    terms = sorted((text(term), float(factor)) for term, factor in coefficients.items())
-    factor = terms[0][1] if leading is None else leading
-    core = " + ".join(f"{each / factor:.{DIGITS}e}*{term}" for term, each in terms)
-    return core, -constant / factor, 1 if factor > 0 else -1
 
 
 @attrs.frozen
@@ -252,43 +144,50 @@ class Switches:
             if branch is None:
                 height, argument = _height(atom)
                 height, sign = self._simpler(height, used)
-                place, orientation = self.surfaces.find(height, argument)
-                orientation *= sign
-                if place not in used:
-                    entries = tuple(map(_without_truths, entries))
-                    return _Stage(entries, used, atom, place, orientation)
-                branch = _branch(atom, used[place] * orientation)
+                if height is not ONE:
+                    argument = argument if argument is None or sign > 0 else -argument
+                    place, orientation = self.surfaces.find(height, argument)
+                    sign *= orientation
+                    if place not in used:
+                        return _Stage(tuple(map(_without_truths, entries)), used, atom, place, sign)
+                    sign *= used[place]
+                branch = _branch(atom, sign)
             entries = tuple(all_replaced(entries, {atom: branch}))
         return _Stage(tuple(map(_without_truths, entries)), used)
 
     def _simpler(self, height: Expression, used: Mapping[int, int]) -> tuple[Expression, int]:
-        """A height without the factors whose signs are known on some sides, and these signs' product."""
-        if not height.is_product:
-            return height, 1
+        """What of a height decides its sign, and the sign of the rest: no factor of known sign, no odd power.
+
+        If no factor is left, the height never changes its sign, though it may touch zero.
+        """
         given = [(self.surfaces.known[number].height, side) for number, side in used.items()]
         kept, sign = [], 1
-        for factor in height.args:
+        for factor in factors_of(height):
+            known = _sign(factor, given if height.is_product else [])
             base, exponent = base_and_exponent(factor)
-            whole = isinstance(exponent, Number) and exponent.is_whole
-            even = whole and exponent.value % 2 == 0
-            if even or isinstance(factor, Exp) or follows(base, 1, given):
-                continue
-            found = range_of(factor)
-            if whole and (found.negative or follows(base, -1, given)):
-                sign = -sign
-            elif not found.positive:
-                kept.append(factor)
-        return (multiply(*kept), sign) if kept else (height, 1)
+            if known:
+                sign *= known
+            else:
+                kept.append(base if isinstance(exponent, Number) and exponent.is_whole else factor)
+        return multiply(*kept), sign
+
+
+def _sign(factor: Expression, given: Sequence[tuple[Expression, int]]) -> int:
+    """The sign of a factor wherever it is not zero; 0 if it is not known."""
+    found = range_of(factor)
+    if found.low.value >= 0.0 or found.high.value <= 0.0:
+        return 1 if found.low.value >= 0.0 else -1
+    base, exponent = base_and_exponent(factor)
+    if follows(base, 1, given):
+        return 1
+    whole = isinstance(exponent, Number) and exponent.is_whole
+    return -1 if whole and follows(base, -1, given) else 0
 
 
 def switching_names(entries: Sequence[Expression], symbols: Symbols) -> list[str]:
     """Names of the switching functions of the state or of time in expressions."""
-    found = {type(atom).__name__ for atom in nodes_of(SWITCHING, *entries) if _switches(atom, symbols)}
+    found = {type(atom).__name__ for atom in nodes_of(SWITCHING, *entries) if moves(atom, symbols.variables)}
     return sorted(found)
-
-
-def _switches(atom: Expression, symbols: Symbols) -> bool:
-    return not isinstance(atom, Level) and mentions(atom, symbols.variables)
 
 
 def _first_atom(entries: Sequence[Expression], symbols: Symbols) -> Expression | None:
@@ -302,7 +201,7 @@ def _first_atom(entries: Sequence[Expression], symbols: Symbols) -> Expression |
             found = search(argument)
             if found is not None:
                 return found
-        if isinstance(node, SWITCHING) and _switches(node, symbols):
+        if isinstance(node, SWITCHING) and moves(node, symbols.variables):
             return node
         clean.add(node)
         return None
@@ -389,7 +288,7 @@ def _pulse(height: Expression, surfaces: Surfaces) -> Expression | None:
     middle = number(2.0 * math.pi) * (u - level / 2)
     pulse = slope * (number(math.cos(math.pi * float(level))) - Cos(middle))
     if slope.is_number:
-        core, _, orientation = _core(pulse, surfaces.symbols)
+        core, _, orientation = core_of(pulse, surfaces.symbols)
         surfaces.pulses[core] = u, level, orientation if slope.value > 0 else -orientation
     return pulse
 
@@ -450,4 +349,6 @@ def _guarded(expression: Expression, heights: Sequence[Expression]) -> Expressio
 
 
 def _is_multiple(base: Expression, heights: Sequence[Expression]) -> bool:
-    return any(ratio(base, height) is not None for height in heights)
+    """Whether a base, or a factor of it, vanishes where a height does."""
+    parts = [base, *(base_and_exponent(factor)[0] for factor in factors_of(base))]
+    return any(ratio(part, height) is not None for part in parts for height in heights)

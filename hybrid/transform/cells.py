@@ -18,7 +18,8 @@ from hybrid.expression.evaluation import expressed, scalar
 from hybrid.expression.graph import all_replaced, nodes_of
 from hybrid.expression.nodes import HALF, ZERO, Expression, Power, add, power
 from hybrid.expression.polynomials import is_zero
-from hybrid.expression.switches import Surfaces, Switches
+from hybrid.expression.surfaces import Surfaces
+from hybrid.expression.switches import Switches
 from hybrid.system.elements import Function
 from hybrid.system.variables import Variables
 from hybrid.transform import additive

@@ -9,7 +9,7 @@ from hybrid.expression.graph import is_larger_than, mentions, nodes_of, replaced
 from hybrid.expression.nodes import Expression, Symbol, add, number, split
 from hybrid.expression.operations import Level
 from hybrid.expression.polynomials import expanded
-from hybrid.expression.switches import QUARTER, Surface
+from hybrid.expression.surfaces import QUARTER, Surface
 from hybrid.expression.text import text
 from hybrid.expression.tracing import Symbols, model_symbols
 from hybrid.system.variables import Variables

@@ -123,7 +123,8 @@ def split(system: HybridSystem) -> HybridSystem:
     sliding fields on the others, in the order in which the surfaces were found; another order may give
     another field.
 
-    *A floor* has two modes for each of its steps' halves, with the surfaces ``sin(2 pi u) = 0``.
+    *A floor* has two modes for each of its steps' halves, with the surfaces ``sin(2 pi u) = 0``. A choice
+    by floors alone, as by ``floor(t) % 2 == 0``, changes where these floors do, and makes no other modes.
 
     *A fractional power* of a height, as in Hertz' ``np.maximum(z, 0)**1.5``, is zero beyond its surface.
 

@@ -17,7 +17,8 @@ from hybrid.expression.evaluation import Program, expressed, scalar
 from hybrid.expression.graph import replaced
 from hybrid.expression.nodes import ZERO, Expression, Symbol
 from hybrid.expression.operations import And, Less, LessEqual, Not, Or
-from hybrid.expression.switches import Resolved, Surfaces, Switches
+from hybrid.expression.surfaces import Surfaces
+from hybrid.expression.switches import Resolved, Switches
 from hybrid.expression.tracing import TraceError, model_symbols, trace
 from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition

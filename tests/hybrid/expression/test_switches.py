@@ -7,11 +7,11 @@ import pytest
 
 from hybrid.expression.code import assignments
 from hybrid.expression.graph import symbols_of
+from hybrid.expression.implications import MOST_TERMS
 from hybrid.expression.nodes import Number, add
 from hybrid.expression.operations import Absolute, Less, Level, Select, Sign, Sin
+from hybrid.expression.surfaces import Surfaces
 from hybrid.expression.switches import (
-    MOST_TERMS,
-    Surfaces,
     Switches,
     _first_atom,
     _without_truths,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hybrid import from_equations, simulate
+from hybrid import compile_system, from_equations, simulate
 
 OUTER = [
     np.sin,
@@ -48,6 +48,46 @@ def test_a_switch_that_is_decided_makes_no_modes(rate, wanted):
     np.testing.assert_allclose(arc.x[-1], wanted + (0.7 - wanted) * np.exp(-3.0), rtol=1e-9)
 
 
+@pytest.mark.parametrize(
+    "rate",
+    [
+        lambda q: np.abs(q**2) - q * q - q,
+        lambda q: np.maximum(q**2 + 0.25, 0) - q * q - 0.25 - q,
+        lambda q: -np.sqrt(np.abs(1 + q**4)) * q / np.sqrt(1 + q**4),
+        lambda q: -np.where(np.exp(-q) > 0, 1.0, 2.0) * q,
+        lambda q: -np.sign(1 + 0.8 * np.cos(3 * q)) * q,
+        lambda q: np.minimum(-(q**2), 0) + q * q - q,
+    ],
+)
+def test_a_height_that_never_changes_its_sign_makes_no_modes(rate):
+    system = from_equations(lambda t, x, p: (rate(x.q),), state=("q",))
+    assert system.mode_names == ("smooth",)
+    arc = simulate(system, (0.7,), (0.0, 3.0))
+    np.testing.assert_allclose(arc.x[-1], 0.7 * np.exp(-3.0), rtol=1e-8)
+
+
+@pytest.mark.parametrize("height", [lambda v: v**3, lambda v: 1 / v, lambda v: v**5 * (1 + v**2)])
+def test_an_odd_power_changes_its_sign_where_its_base_does(height):
+    """The block slows down, then sticks: the spring is weaker than friction."""
+    field = lambda t, x, p: (x.v, -0.1 * x.q - np.sign(height(x.v)))  # noqa: E731
+    block = from_equations(field, state=("q", "v"))
+    assert sorted(block.mode_names) == ["v<0", "v=0", "v>0"]
+    arc = simulate(block, (0.0, 1.0), (0.0, 3.0))
+    plain = from_equations(lambda t, x, p: (x.v, -0.1 * x.q - np.sign(x.v)), state=("q", "v"))
+    np.testing.assert_allclose(arc.x[-1], simulate(plain, (0.0, 1.0), (0.0, 3.0)).x[-1], rtol=1e-12)
+    assert arc.mode[-1] == "v=0"
+
+
+def test_a_root_of_a_cube_is_zero_beyond_its_surface():
+    field = lambda t, x, p: (x.v, -5 * np.sqrt(np.maximum(x.q**3, 0)) - 1)  # noqa: E731
+    other = lambda t, x, p: (x.v, -5 * np.maximum(x.q, 0) ** 1.5 - 1)  # noqa: E731
+    found, wanted = (
+        simulate(from_equations(each, state=("q", "v")), (-1.0, 2.0), (0.0, 4.0)) for each in (field, other)
+    )
+    assert len(found.jumps) == len(wanted.jumps) == 2
+    np.testing.assert_allclose(found.x[-1], wanted.x[-1], rtol=1e-9)
+
+
 @pytest.mark.parametrize("offset", [0.0, 0.7, -5.3])
 @pytest.mark.parametrize(("period", "share"), [(4.0, 0.5), (4.0, 0.25), (2.0, 0.825), (3.0, 1e-3)])
 def test_a_duty_cycle_has_two_modes(period, share, offset):
@@ -89,3 +129,64 @@ def test_levels_of_one_fraction():
     assert len(system.modes) == 3
     arc = simulate(system, (0.0,), (0.0, 8.0), parameters={"T": 2.0})
     np.testing.assert_allclose(arc.x[-1], 4 * (0.5 * 1.0 + 0.5 * 2.0), rtol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("wave", "modes", "mean"),
+    [
+        (lambda t: np.abs(np.mod(t, 2.0) - 1), 2, 0.5),
+        (lambda t: np.abs(np.mod(-t, 2.0) - 1), 2, 0.5),
+        (lambda t: 2 * np.abs(t / 2 - np.floor(t / 2 + 0.5)), 2, 0.5),
+        (lambda t: 2 * np.minimum(np.mod(t / 2, 1), 0.25), 3, 0.4375),
+        (lambda t: np.where(np.mod(t / 2, 1) < 0.3, np.mod(t / 2, 1), 0), 2, 0.045),
+        (lambda t: np.where(np.mod(t, 2) < 0.6, 1, 0) + np.where(np.mod(t, 2) < 1.2, 1, 0), 3, 0.9),
+        (lambda t: np.clip(3 * np.abs(np.mod(t, 2) - 1) - 1, 0, 1), 6, 0.5),
+    ],
+)
+def test_a_wave_has_no_modes_where_its_fraction_cannot_be(wave, modes, mean):
+    system = from_equations(lambda t, x, p: (wave(t) + 0 * x.q,), state=("q",))
+    assert len(system.modes) == modes
+    arc = simulate(system, (0.0,), (0.3, 14.3))
+    assert arc.status.ok
+    np.testing.assert_allclose(arc.x[-1], 14 * mean, rtol=1e-12)
+
+
+@pytest.mark.parametrize("factor", [3.0, -3.0])
+@pytest.mark.parametrize("rounded", [np.floor, np.ceil])
+@pytest.mark.parametrize("q", [0.1, 0.2, -0.1, -0.2])
+def test_the_name_of_a_step_is_true(factor, rounded, q):
+    system = from_equations(lambda t, x, p: (rounded(factor * x.q),), state=("q",))
+    [name] = {*simulate(system, (q,), (0.0, 1e-6)).mode}
+    half = ">" if q * 3.0 % 1 > 0.5 else "<"
+    assert name == f"mod(3*q,1){half}1/2"
+
+
+@pytest.mark.parametrize(
+    ("rate", "wanted"),
+    [
+        (lambda n: np.where(n == 2, 1.0, 0.0), 1.0),
+        (lambda n: np.where(n != 2, 1.0, 0.0), 5.25),
+        (lambda n: np.where(n > 2, 1.0, 0.0), 3.25),
+        (lambda n: np.where(n >= 2, 1.0, 0.0), 4.25),
+        (lambda n: np.where(np.mod(n, 2) == 0, 1.0, -1.0), 0.25),
+        (lambda n: np.where(np.mod(n, 2) < 0.5, 1.0, -1.0), 0.25),
+        (lambda n: np.floor(n / 2), 6.75),
+        (lambda n: np.mod(n, 3), 6.0),
+        (lambda n: np.sign(n - 1), 3.25),
+        (lambda n: np.select([n == 0, n == 1], [3.0, 2.0], 1.0), 9.25),
+    ],
+)
+def test_choices_by_a_floor_change_with_it(rate, wanted):
+    system = from_equations(lambda t, x, p: (rate(np.floor(t)) + 0 * x.q,), state=("q",))
+    assert set(system.mode_names) == {"mod(t,1)<1/2", "mod(t,1)>1/2"}
+    arc = simulate(system, (0.0,), (0.0, 6.25))
+    np.testing.assert_allclose(arc.x[-1], wanted, rtol=1e-9)
+
+
+def test_choices_by_a_floor_of_the_state():
+    """Gears: each has its own acceleration."""
+    gear = lambda v: np.where(np.floor(v) == 0, 4.0, np.where(np.floor(v) == 1, 2.0, 1.0))  # noqa: E731
+    car = from_equations(lambda t, x, p: (gear(x.v),), state=("v",))
+    arc = simulate(car, (0.0,), (0.0, 1.75))
+    np.testing.assert_allclose(arc.x[-1], 3.0, rtol=1e-9)
+    assert "jumps" not in repr(compile_system(car))
