@@ -286,7 +286,8 @@ def _pulse(height: Expression, surfaces: Surfaces) -> Expression | None:
     if not 0 < level.value < 1:
         return slope if level.value <= 0 else -slope
     middle = number(2.0 * math.pi) * (u - level / 2)
-    pulse = slope * (number(math.cos(math.pi * float(level))) - Cos(middle))
+    # cos(pi*d), which is zero for half a turn.
+    pulse = slope * (number(math.sin(math.pi * (0.5 - float(level)))) - Cos(middle))
     if slope.is_number:
         core, _, orientation = core_of(pulse, surfaces.symbols)
         surfaces.pulses[core] = u, level, orientation if slope.value > 0 else -orientation

@@ -12,6 +12,7 @@ from typing import Any
 
 import attrs
 
+from hybrid.errors import ModelError
 from hybrid.expression.continuity import vanishes_on
 from hybrid.expression.derivatives import jacobian_of
 from hybrid.expression.evaluation import expressed, scalar
@@ -19,10 +20,11 @@ from hybrid.expression.graph import all_replaced, nodes_of
 from hybrid.expression.nodes import HALF, ZERO, Expression, Power, add, power
 from hybrid.expression.polynomials import is_zero
 from hybrid.expression.surfaces import Surfaces
-from hybrid.expression.switches import Switches
+from hybrid.expression.switches import Resolved, Switches
 from hybrid.system.elements import Function
 from hybrid.system.variables import Variables
 from hybrid.transform import additive
+from hybrid.transform.naming import Names
 from hybrid.transform.rounding import combined
 from hybrid.transform.surface import SwitchingSurface
 
@@ -233,9 +235,23 @@ class Pieces:
         return self._resolved(sides)[: self.size]
 
     def _resolved(self, sides: Sides) -> list[Expression]:
+        return [*self._all_decided(sides).entries]
+
+    def _all_decided(self, sides: Sides) -> Resolved:
+        """Every function on these sides; an error if they leave a switch open.
+
+        They do where further surfaces pass through an intersection: to cross one is to cross others.
+        """
         result = self.switches.resolved(sides)
-        assert not isinstance(result, int), "the side of a surface is missing"
-        return [*result.entries]
+        if isinstance(result, int):
+            names, known = Names(self.variables), self.surfaces.known
+            meeting = [names.side(known, number, 0) for number, side in sides.items() if side in (-2, 0, 2)]
+            raise ModelError(
+                f"split: the surface {names.side(known, result, 0)} passes through the intersection of "
+                f"{' and '.join(meeting)}, where a state may slide. Write its switch without the others "
+                "(np.sign(a**2 - b**2) in place of np.sign(abs(a) - abs(b))), or make its sides modes."
+            )
+        return result
 
     def between(self, sides: Sides, number: int) -> SwitchingSurface:
         """A surface with the flows on either side of it, all other sides as given."""
@@ -300,9 +316,7 @@ class Pieces:
         return all_replaced(field, dict.fromkeys(roots, ZERO))
 
     def _bare_field(self, sides: Sides) -> list[Expression]:
-        result = self.switches.resolved(sides)
-        assert not isinstance(result, int), "the side of a surface is missing"
-        return [*result.bare[: self.size]]
+        return [*self._all_decided(sides).bare[: self.size]]
 
     def changes(self, sides: Sides, number: int) -> Iterator[list[Expression]]:
         """The change of the field from below a surface to above it, at each vertex of the other sides."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hybrid import compile_system, from_equations, simulate
+from hybrid import ModelError, compile_system, from_equations, simulate
 
 OUTER = [
     np.sin,
@@ -190,3 +190,21 @@ def test_choices_by_a_floor_of_the_state():
     arc = simulate(car, (0.0,), (0.0, 1.75))
     np.testing.assert_allclose(arc.x[-1], 3.0, rtol=1e-9)
     assert "jumps" not in repr(compile_system(car))
+
+
+def test_the_note_of_half_a_turn_shows_no_rounding():
+    field = lambda t, x, p: (np.where(np.mod(x.th, 2 * np.pi) < np.pi, 1.0, 0.3),)  # noqa: E731
+    assert "e-17" not in repr(from_equations(field, state=("th",)))
+
+
+def test_surfaces_that_meet_in_one_place_are_named():
+    """Both lines |q| = |v| pass through the corner of q = 0 and v = 0."""
+
+    def field(height):
+        return lambda t, x, p: (x.v, -0.4 * np.sign(height(x.q, x.v)) * x.q - 0.1 * x.v)
+
+    with pytest.raises(ModelError, match=r"q\+v=0 passes through the intersection of .*q=v") as caught:
+        from_equations(field(lambda q, v: np.abs(q) - np.abs(v)), state=("q", "v"))
+    assert "np.sign(a**2 - b**2)" in str(caught.value)
+    arc = simulate(from_equations(field(lambda q, v: q**2 - v**2), state=("q", "v")), (0.8, -0.4), (0.0, 4.0))
+    assert arc.status.ok
