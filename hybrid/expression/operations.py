@@ -259,7 +259,7 @@ class Level(Floor):
     """A floor in a place where it does not jump: its jumps are events of their own."""
 
     word = "floor"
-    # Written so that a list of operations tells it from a floor that jumps.
+    # Written so that it can be told from a floor that jumps.
     numpy = staticmethod(lambda u: np.floor(np.positive(np.positive(u))))
 
 

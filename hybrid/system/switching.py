@@ -99,22 +99,28 @@ def _proportional(heights: Sequence[float], others: Sequence[float]) -> bool:
 
 
 class _Probe(NDArrayOperatorsMixin):
-    """A number that remembers the switching functions applied to it."""
+    """A number that remembers the switching functions applied to it.
 
-    __slots__ = ("log", "value")
+    A floor of a number with two plus signs in front is a level, as `hybrid.split` writes it: it does not jump
+    inside of its mode.
+    """
+
+    __slots__ = ("log", "signs", "value")
     __class__ = property(lambda self: np.float64)
 
-    def __init__(self, value: Any, log: Log) -> None:
-        self.value, self.log = value, log
+    def __init__(self, value: Any, log: Log, signs: int = 0) -> None:
+        self.value, self.log, self.signs = value, log, signs
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         if any(type(each) is np.ndarray for each in inputs):
             # Entry by entry: NumPy comes back with single numbers.
             return np.frompyfunc(ufunc, ufunc.nin, 1)(*map(_objects, inputs))
         numbers = [_number(each) for each in inputs]
-        if ufunc.__name__ in SWITCHING:
+        is_level = ufunc is np.floor and self.signs == 2
+        if ufunc.__name__ in SWITCHING and not is_level:
             self.log.append((ufunc.__name__, _heights(ufunc.__name__, numbers)))
-        return _Probe(getattr(ufunc, method)(*numbers, **options), self.log)
+        signs = self.signs + 1 if ufunc is np.positive else 0
+        return _Probe(getattr(ufunc, method)(*numbers, **options), self.log, signs)
 
     def __array_function__(self, function: Callable[..., Any], types: Any, args: Any, kwargs: Any) -> Any:
         plain = [*map(_plain, args)]

@@ -118,7 +118,7 @@ class _Writer:
             return self._add(expression.bounds, *map(self.place, arguments))
         if expression.in_other_terms is not None:
             return self.place(expression.in_other_terms(*arguments))
-        raise NoProgram(f"{kind.__name__} has no interval arithmetic here")
+        raise NoProgram(f"{expression.word} has no interval arithmetic here")
 
     def _sum(self, *terms: Expression) -> int:
         total = self.place(terms[0])

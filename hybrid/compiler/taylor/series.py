@@ -37,6 +37,7 @@ from hybrid.expression.operations import (
     Cosh,
     Exp,
     Expm1,
+    Level,
     Log,
     Log1p,
     Sin,
@@ -52,8 +53,7 @@ BY_DERIVATIVE = (Log, Log1p, Expm1, Arcsin, Arccos, Arctan, Arcsinh, Arccosh, Ar
 PAIRS = dict.fromkeys((Sin, Cos), (Sin, Cos, "-")) | dict.fromkeys((Sinh, Cosh), (Sinh, Cosh, ""))
 # ``y' = (1 -+ y^2) u'``.
 OWN_SQUARE = {Tanh: -1, Tan: 1}
-
-# Longer inner sums are not expanded, since other expressions may need them too.
+# Longer inner sums are not expanded: other expressions may need them too.
 MOST_TERMS = 4
 
 
@@ -274,7 +274,9 @@ class Recurrences:
             return self._bind(expression, text, text)
         if isinstance(expression, BY_DERIVATIVE):
             return self._by_derivative(expression)
-        raise NoSeries(f"{type(expression).__name__} is not analytic")
+        if isinstance(expression, Level):
+            return self._bind(expression, f"np.floor({self.coefficient(*expression.args)})", "0.0")
+        raise NoSeries(f"{expression.word} is not analytic")
 
     def _sum(self, expression: Expression) -> str:
         terms = self._terms(expression)

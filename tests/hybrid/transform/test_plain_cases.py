@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hybrid import ModelError, compile_system, from_equations, simulate
+from hybrid import DOP853, ModelError, compile_system, from_equations, simulate
 
 OUTER = [
     np.sin,
@@ -208,3 +208,16 @@ def test_surfaces_that_meet_in_one_place_are_named():
     assert "np.sign(a**2 - b**2)" in str(caught.value)
     arc = simulate(from_equations(field(lambda q, v: q**2 - v**2), state=("q", "v")), (0.8, -0.4), (0.0, 4.0))
     assert arc.status.ok
+
+
+def test_a_floor_is_a_constant_of_each_mode():
+    """Its modes have series, and tangent vectors lose no digits."""
+    stairs = from_equations(lambda t, x, p: (x.v, -np.sin(x.q) + 0.2 * np.floor(x.q)), state=("q", "v"))
+    told = repr(compile_system(stairs))
+    assert told.count("Taylor series") == len(stairs.modes) == 2
+    arc = simulate(stairs, (1.3, 0.2), (0.0, 10.0), tangent=True)
+    tight = DOP853(rtol=1e-12, atol=1e-12)
+    other = simulate(stairs, (1.3, 0.2), (0.0, 10.0), tangent=True, solver=tight)
+    assert arc.status.message == "Reached the end."
+    np.testing.assert_allclose(arc.x[-1], other.x[-1], atol=1e-10)
+    np.testing.assert_allclose(arc.fundamental, other.fundamental, atol=1e-9)
