@@ -18,15 +18,16 @@ from hybrid.expression.derivatives import derivative
 from hybrid.expression.graph import (
     MOST_EXPANDED,
     contains,
-    in_order,
     is_larger_than,
     mentions,
     nodes,
     nodes_of,
     once,
     replaced,
+    rewritten,
     symbols_of,
     terms_of,
+    with_arguments,
 )
 from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol, multiply, number, order_of, split
 from hybrid.expression.operations import (
@@ -198,16 +199,13 @@ def _sides(atom: Expression, step: Expression) -> tuple[Expression | None, tuple
 
 def _substituted(expression: Expression, values: Mapping[Any, Expression]) -> Expression:
     """The expression with others in the place of some parts, and without whole turns of harmonics."""
-    found: dict[Expression, Expression] = dict(values)
-    for node in in_order([expression]):
-        if node not in found:
-            args = [found[each] for each in node.args]
-            same = all(after is before for after, before in zip(args, node.args, strict=True))
-            if isinstance(node, Sin | Cos | Tan) and not same:
-                found[node] = _of_turns(type(node), args[0])
-            else:
-                found[node] = node if same else node.rebuilt(args)
-    return found[expression]
+    return rewritten(expression, _without_turns, values)
+
+
+def _without_turns(node: Expression, args: list[Expression]) -> Expression:
+    if isinstance(node, Sin | Cos | Tan) and args[0] is not node.args[0]:
+        return _of_turns(type(node), args[0])
+    return with_arguments(node, args)
 
 
 def _of_turns(function: type[Sin | Cos | Tan], angle: Expression) -> Expression:
@@ -240,23 +238,20 @@ def _without_choices(expression: Expression) -> Expression:
 
     An equality counts as false, because it holds only on a surface and not beside it.
     """
-    found: dict[Expression, Expression] = {}
-    for node in in_order([expression]):
-        args = [found[each] for each in node.args]
-        if isinstance(node, Select):
-            condition, a, b = args
-            condition = _truth(node.args[0], condition)
-            found[node] = condition * a + (1 - condition) * b
-        elif isinstance(node, And | Or):
-            a, b = (_truth(raw, arg) for raw, arg in zip(node.args, args, strict=True))
-            found[node] = a * b if isinstance(node, And) else a + b - a * b
-        elif isinstance(node, Not):
-            found[node] = 1 - _truth(node.args[0], args[0])
-        elif isinstance(node, Equal):
-            found[node] = ZERO
-        else:
-            found[node] = node.rebuilt(args) if args else node
-    return found[expression]
+    return rewritten(expression, _as_polynomial)
+
+
+def _as_polynomial(node: Expression, args: list[Expression]) -> Expression:
+    if isinstance(node, Select):
+        condition, a, b = args
+        condition = _truth(node.args[0], condition)
+        return condition * a + (1 - condition) * b
+    if isinstance(node, And | Or):
+        a, b = (_truth(raw, arg) for raw, arg in zip(node.args, args, strict=True))
+        return a * b if isinstance(node, And) else a + b - a * b
+    if isinstance(node, Not):
+        return 1 - _truth(node.args[0], args[0])
+    return ZERO if isinstance(node, Equal) else with_arguments(node, args)
 
 
 def _truth(raw: Expression, value: Expression) -> Expression:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from hybrid.expression.graph import contains, in_order, once
+from hybrid.expression.graph import contains, in_order, once, rewritten, with_arguments
 from hybrid.expression.nodes import (
     HALF,
     MINUS_ONE,
@@ -16,6 +16,7 @@ from hybrid.expression.nodes import (
     Expression,
     Symbol,
     add,
+    is_even_power,
     multiply,
     number,
     power,
@@ -193,14 +194,14 @@ def defined_at_origin(expression: Expression) -> Expression:
     ``u*hypot(u, w)``, a drag, has the slope ``hypot(u, w) + u*u/hypot(u, w)``, which is 0 at the origin. The
     same for roots of sums of squares.
     """
-    changed: dict[Expression, Expression] = {}
-    for node in in_order([expression]):
-        args = [changed[each] for each in node.args]
-        if node.is_power and _is_over_length(*node.args):
-            args[0] = Maximum(args[0], SMALLEST_LENGTH)
-        same = all(new is old for new, old in zip(args, node.args, strict=True))
-        changed[node] = node if same else node.rebuilt(args)
-    return changed[expression]
+    return rewritten(expression, _with_length)
+
+
+def _with_length(node: Expression, args: list[Expression]) -> Expression:
+    """A node in which a length that it divides by is not zero."""
+    if node.is_power and _is_over_length(*node.args):
+        args[0] = Maximum(args[0], SMALLEST_LENGTH)
+    return with_arguments(node, args)
 
 
 def _is_over_length(base: Expression, exponent: Expression) -> bool:
@@ -213,8 +214,7 @@ def _is_over_length(base: Expression, exponent: Expression) -> bool:
 def _is_square(term: Expression) -> bool:
     """Whether a term of a sum is an even power, or a positive multiple of one."""
     factor, rest = split(term)
-    even = rest.is_power and rest.exponent.is_number and rest.exponent.is_whole
-    return factor > 0 and even and rest.exponent.value % 2 == 0
+    return factor > 0 and is_even_power(rest)
 
 
 @once
@@ -224,16 +224,14 @@ def close_gates(expression: Expression) -> Expression:
     The slope of ``max(z, 0)**(1/4)`` is ``max(z, 0)**(-3/4)/4 * Step(z)``: 0 for ``z < 0``, never
     ``inf*0``.
     """
-    if not contains(expression, (Step, Select)):
-        return expression
-    closed: dict[Expression, Expression] = {}
-    for node in in_order([expression]):
-        args = [closed[each] for each in node.args]
-        if contains(node, (Step, Select)):
-            closed[node] = _closed_product(args) if node.is_product else node.rebuilt(args)
-        else:
-            closed[node] = node
-    return closed[expression]
+    return rewritten(expression, _closed) if contains(expression, (Step, Select)) else expression
+
+
+def _closed(node: Expression, args: list[Expression]) -> Expression:
+    """A node with closed arguments; a product itself is closed, too."""
+    if node.is_product and contains(node, (Step, Select)):
+        return _closed_product(args)
+    return with_arguments(node, args)
 
 
 def _closed_product(factors: Sequence[Expression]) -> Expression:

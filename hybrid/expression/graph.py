@@ -178,6 +178,28 @@ def is_larger_than(most: int, expression: Expression) -> bool:
     return expression.size > min(most, COUNTLESS - 1)
 
 
+def with_arguments(node: Expression, args: Sequence[Expression]) -> Expression:
+    """The node computed from other nodes; itself if they are the same."""
+    same = all(new is old for new, old in zip(args, node.args, strict=True))
+    return node if same else node.rebuilt(args)
+
+
+def rewritten(
+    expression: Expression,
+    rule: Callable[[Expression, list[Expression]], Expression],
+    values: Mapping[Any, Expression] | None = None,
+) -> Expression:
+    """The expression with each node as ``rule`` makes it of the node and of its rewritten arguments.
+
+    ``values`` are known before.
+    """
+    found: dict[Expression, Expression] = dict(values or {})
+    for node in in_order([expression]):
+        if node not in found:
+            found[node] = rule(node, [found[each] for each in node.args])
+    return found[expression]
+
+
 def replaced(expression: Expression, values: Mapping[Any, Expression]) -> Expression:
     """An expression with some of its nodes replaced."""
     return all_replaced([expression], values)[0]
@@ -202,7 +224,5 @@ def all_replaced(expressions: Iterable[Expression], values: Mapping[Any, Express
             if missing:
                 waiting += missing
             else:
-                args = [known[each] for each in node.args]
-                same = all(new is old for new, old in zip(args, node.args, strict=True))
-                known[waiting.pop()] = node if same else node.rebuilt(args)
+                known[waiting.pop()] = with_arguments(node, [known[each] for each in node.args])
     return [known[each] for each in expressions]

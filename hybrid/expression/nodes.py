@@ -288,11 +288,11 @@ class Product(Expression):
         if exponent.is_whole:
             return multiply(*(power(each, exponent) for each in self.args))
         apart = [Number(abs(each.value)) for each in numbers if abs(each.value) != 1]
-        apart += [each for each in self.args if _is_even_power(each)]
+        apart += [each for each in self.args if is_even_power(each)]
         if not apart:
             return None
         sign = MINUS_ONE if self.leads_with_minus else ONE
-        inner = multiply(sign, *(each for each in self.args if not (each.is_number or _is_even_power(each))))
+        inner = multiply(sign, *(each for each in self.args if not (each.is_number or is_even_power(each))))
         return multiply(power(inner, exponent), *(power(each, exponent) for each in apart))
 
 
@@ -313,7 +313,7 @@ class Power(Expression):
         base, inner = self.base, self.exponent
         if exponent.is_whole or (base.is_symbol and base.positive):
             return power(base, multiply(inner, exponent))
-        if _is_even_power(self):
+        if is_even_power(self):
             return power(Function.known["Absolute"](base), multiply(inner, exponent))
         return None
 
@@ -487,7 +487,8 @@ def _power_of_zero(exponent: Expression) -> Expression:
     return select(less(ZERO, exponent), ZERO, select(equal(exponent, ZERO), ONE, Number(math.inf)))
 
 
-def _is_even_power(expression: Expression) -> bool:
+def is_even_power(expression: Expression) -> bool:
+    """Whether an expression is an even whole power, which is never negative."""
     if not expression.is_power or not expression.exponent.is_number:
         return False
     return expression.exponent.is_whole and expression.exponent.value % 2 == 0

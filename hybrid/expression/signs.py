@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hybrid.expression.graph import MOST_EXPANDED, contains, in_order, is_larger_than
+from hybrid.expression.graph import (
+    MOST_EXPANDED,
+    contains,
+    is_larger_than,
+    rewritten,
+    with_arguments,
+)
 from hybrid.expression.nodes import ONE, ZERO, Expression, number
 from hybrid.expression.operations import Absolute, Less, LessEqual, Maximum, Minimum, Select, Sign, Step
 from hybrid.expression.polynomials import coefficients_of
@@ -14,13 +20,9 @@ SWITCHES = (Maximum, Minimum, Absolute, Sign, Step, Select)
 
 def simplified(expression: Expression, known: Sequence[Expression]) -> Expression:
     """The expression, simplified by the fact that everything in ``known`` is positive or zero."""
-    made: dict[Expression, Expression] = {}
-    for node in in_order([expression]):
-        if contains(node, SWITCHES):
-            made[node] = _decided(node, [made[each] for each in node.args], known)
-        else:
-            made[node] = node
-    return made[expression]
+    if not contains(expression, SWITCHES):
+        return expression
+    return rewritten(expression, lambda node, args: _decided(node, args, known))
 
 
 def _decided(node: Expression, args: list[Expression], known: Sequence[Expression]) -> Expression:
@@ -41,7 +43,7 @@ def _decided(node: Expression, args: list[Expression], known: Sequence[Expressio
         sign = sign_of(b - a, known)
         if sign:
             return args[1] if sign > 0 else args[2]
-    return node.rebuilt(args)
+    return with_arguments(node, args)
 
 
 def sign_of(expression: Expression, known: Sequence[Expression]) -> int:
