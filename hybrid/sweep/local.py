@@ -6,7 +6,7 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from queue import Empty, SimpleQueue
+from queue import Empty, Queue, SimpleQueue
 from typing import Any
 
 import attrs
@@ -49,7 +49,8 @@ class _Run:
         self.job, self.keep, self.stored = job, keep, stored
         self.stop = threading.Event()
         # Numbers of points that were kept, an error, or None from a worker that has ended.
-        self.reports: SimpleQueue[int | BaseException | None] = SimpleQueue()
+        # A SimpleQueue waits without end if its time is over when it has heard a signal.
+        self.reports: Queue[int | BaseException | None] = Queue()
         self.source: _Alone | _InLine = _Alone(job) if job.lines is None else _InLine(job, self.stop)
 
     def run(self, pool: ThreadPoolExecutor, workers: int, report: Callable[[int], object]) -> bool:

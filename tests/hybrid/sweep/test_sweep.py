@@ -181,6 +181,28 @@ def test_an_interrupt_ends_the_run_in_hand():
     assert (swept.status == StatusCode.NOT_RUN).all()
 
 
+def test_an_interrupt_is_heard_while_the_interpreter_is_busy():
+    """The interrupt comes while a task keeps the interpreter for itself, longer than between two looks."""
+    system = models.impact_oscillator()
+
+    def task(p):
+        # The main thread waits by now.
+        time.sleep(0.1)
+        os.kill(os.getpid(), signal.SIGINT)
+        sum(range(3 * 10**7))
+        arc = hybrid.simulate(system, (0.0, 0.0), (0.0, 1e8), parameters=p, samples=[1e8], max_jumps=10**9)
+        return {"t": arc.steps}
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    begin = time.process_time()
+    try:
+        swept = sweep(task, {"c": [0.1, 0.2]}, executor=1)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert time.process_time() - begin < 10.0
+    assert (swept.status == StatusCode.NOT_RUN).all()
+
+
 def test_a_bar_shows_the_time_left(capsys):
     sweep(lambda p: {"a2": p["a"]}, {"a": np.arange(20.0)}, progress=True)
     assert "Sweep" in capsys.readouterr().err
