@@ -37,6 +37,7 @@ from hybrid.sweep.attractors.fractions import basin_fractions
 from hybrid.sweep.many import simulate_many
 from hybrid.sweep.store import open_store
 from hybrid.sweep.sweep import sweep
+from hybrid.system.clocks import After, At, Every
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.system.laws import Laws
@@ -47,8 +48,10 @@ __version__ = "0.1.0"
 
 __all__ = [
     "DOP853",
+    "After",
     "Answer",
     "ArgumentError",
+    "At",
     "Attractor",
     "Attractors",
     "Bifurcation",
@@ -56,6 +59,7 @@ __all__ = [
     "Branch",
     "CodimensionTwo",
     "CompiledSystem",
+    "Every",
     "GlobalError",
     "Grazing",
     "Guard",

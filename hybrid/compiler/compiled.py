@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
+from itertools import accumulate, chain
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +24,7 @@ from hybrid.compiler.traced import key_of
 from hybrid.errors import ArgumentError, ModelError
 from hybrid.kernels.types.codes import DESINGULARISED, NARROW, NO_MODE, ROOTED, RUNGE_KUTTA
 from hybrid.kernels.types.layout import Model, Programs
-from hybrid.system.functions import CONDITION, ModelFunction
+from hybrid.system.functions import CLOCK, CONDITION, ModelFunction
 from hybrid.system.graph import HybridSystem, as_system, functions_of, watched_by
 from hybrid.system.periodicity import period_at, period_fault
 from hybrid.system.watched import Watched
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from hybrid.compiler.emitted import Emitted
 
 # The functions of a model as ``hybrid.kernels.evaluate`` numbers them.
-FUNCTION_NUMBERS = {"field": 0, "guard": 1, CONDITION: 1, "reset": 2}
+FUNCTION_NUMBERS = {"field": 0, "guard": 1, CLOCK: 1, CONDITION: 1, "reset": 2}
 GRADIENT = 3
 UNBOUNDED = "its forcing cannot be bounded: a pulse in time that is narrower than a step may be stepped over"
 # Threads that meet a new system compile it once; stages of a growing system share what is written.
@@ -96,6 +97,8 @@ class CompiledSystem:
     def _crossings_of(self, transition: int) -> str:
         """How the crossings of a guard are found, in words."""
         emitted = self.emitted
+        if self.system.transitions[transition].clock is not None:
+            return "clock, its ticks are known"
         if emitted.affine_guard[transition]:
             return "affine guard, its crossings are isolated on each step"
         if emitted.is_sampled(transition):
@@ -264,6 +267,7 @@ class CompiledSystem:
         transitions = system.transitions
         first_outgoing, outgoing = _leaving(system, at_start=False)
         first_at_start, at_start = _leaving(system, at_start=True)
+        first_clock, clocks = _clocks(system)
         return Model(
             **self.functions(FIELDS),
             **self.functions(EVENTS),
@@ -276,6 +280,10 @@ class CompiledSystem:
             outgoing=outgoing,
             first_at_start=first_at_start,
             at_start=at_start,
+            clock=_indices(0 if each.clock is None else each.clock.number for each in transitions),
+            first_clock=first_clock,
+            clocks=clocks,
+            first_tick=_indices(system.first_tick),
             target=_indices(_index_or_none(system, transition.target) for transition in transitions),
             direction=_indices(transition.guard.direction for transition in transitions),
             programs=self._programs,
@@ -331,10 +339,18 @@ def _leaving(system: HybridSystem, *, at_start: bool) -> tuple[np.ndarray, np.nd
         indices += [
             i
             for i, transition in enumerate(system.transitions)
-            if transition.source == name and transition.guard.at_start == at_start
+            if transition.source == name and transition.guard.at_start == at_start and not transition.clock
         ]
         first.append(len(indices))
     return _indices(first), _indices(indices)
+
+
+def _clocks(system: HybridSystem) -> tuple[np.ndarray, np.ndarray]:
+    """The transitions with clocks that leave each mode: first places, and indices."""
+    pairs = [*enumerate(system.transitions)]
+    of_modes = [[i for i, each in pairs if each.source == name and each.clock] for name in system.mode_names]
+    ends = accumulate(map(len, of_modes), initial=0)
+    return _indices(ends), _indices(chain.from_iterable(of_modes))
 
 
 def _slopes(columns: Sequence[Sequence[Sequence[int]]]) -> dict[str, np.ndarray]:

@@ -105,7 +105,12 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
         )
         for mode, field, around in zip(system.modes, fields, boundaries, strict=True)
     ]
-    affine = tuple(_is_affine(guard, symbols.variables) for guard in guards)
+    # The zeros of a clock are known: nothing is asked of it as a function but its gradient.
+    clocks = [transition.clock is not None for transition in system.transitions]
+    affine = tuple(
+        clock or _is_affine(guard, symbols.variables) for clock, guard in zip(clocks, guards, strict=True)
+    )
+    crossed = [guard for clock, guard in zip(clocks, guards, strict=True) if not clock]
     traced = [None if guard.expressions is None else guard.expressions[0] for guard in guards]
     n = system.dimension
     steep = [
@@ -187,14 +192,17 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
         discontinuities=tuple(
             _where_it_jumps(system, i, fields[i], boundaries[i], symbols) for i in range(len(fields))
         ),
-        proved_period=_has_proved_period(system, [*fields, *guards, *conditions, *resets], writer),
+        proved_period=_has_proved_period(system, [*fields, *crossed, *conditions, *resets], writer),
         steep=tuple(_told(system, powers) for powers in steep),
         steep_inside=tuple(
             _told(system, steep_inside(field.expressions, around, symbols))
             for field, around in zip(fields, boundaries, strict=True)
         ),
         crossing=crossing,
-        timed_guard=tuple(not is_free(guard.expressions, (symbols.t,)) for guard in guards),
+        timed_guard=tuple(
+            not (clock or is_free(guard.expressions, (symbols.t,)))
+            for clock, guard in zip(clocks, guards, strict=True)
+        ),
         timed_reset=tuple(not is_free(reset.expressions, (symbols.t,)) for reset in resets),
         read_by=readers(system, fields, guards, conditions, resets, symbols),
         jumping_reset=tuple(
@@ -414,7 +422,7 @@ def _boundaries(
             _is_affine(written, symbols.variables),
         )
         for transition, written in zip(system.transitions, guards, strict=True)
-        if transition.source == mode and not transition.guard.at_start
+        if transition.source == mode and _is_crossed(transition)
     ]
 
 
@@ -423,7 +431,7 @@ def _gradients(
 ) -> list[Sequence[Expression] | None]:
     """The gradients of the guards in a mode; None for one that is not traced."""
     pairs = zip(system.transitions, guards, strict=True)
-    written = [guard for transition, guard in pairs if transition.source == mode]
+    written = [guard for transition, guard in pairs if transition.source == mode and not transition.clock]
     return [None if guard.jacobian is None or guard.given else guard.jacobian[0] for guard in written]
 
 
@@ -466,9 +474,14 @@ def _guards_in_series(system: HybridSystem, propagators: Sequence[Propagator]) -
     """By transition: whether the series of its source mode hold its guard; none follow guards of a start."""
     held = {mode: iter(each.guards) for mode, each in zip(system.mode_names, propagators, strict=True)}
     return tuple(
-        not transition.guard.at_start and next(held[transition.source], False)
+        _is_crossed(transition) and next(held[transition.source], False)
         for transition in system.transitions
     )
+
+
+def _is_crossed(transition: Transition) -> bool:
+    """Whether crossings of a guard are searched for."""
+    return transition.clock is None and not transition.guard.at_start
 
 
 def _ends_mode(transition: Transition) -> bool:

@@ -65,6 +65,8 @@ def is_paired(system: HybridSystem, emitted: Emitted, index: int) -> bool:
     towards = own.guard.direction * emitted.orientation[index]
     return any(
         other.source == own.source
+        and own.clock is None
+        and other.clock is None
         and emitted.surface[i] == emitted.surface[index]
         and other.guard.direction * emitted.orientation[i] != towards
         for i, other in enumerate(system.transitions)

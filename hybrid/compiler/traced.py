@@ -89,6 +89,7 @@ def key_of(system: HybridSystem, traces: Traces) -> str | None:
             transition.accumulates_to,
             int(transition.guard.direction),
             transition.guard.at_start,
+            transition.clock is None,
             transition.guard.when is None,
             transition.reset is None,
         ]

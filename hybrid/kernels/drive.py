@@ -5,6 +5,14 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.clock import forward, set_clock, time_left
+from hybrid.kernels.events.clocks import (
+    go_to_tick,
+    has_clocks,
+    next_tick,
+    rounding_of_tick,
+    ticking,
+    wind,
+)
 from hybrid.kernels.events.guards import (
     guard_value,
     rounding_band,
@@ -79,7 +87,10 @@ def fire(parts, task, stop_cycle, stop_phase, max_jumps):
         return GO_ON
     if parts.complete == 0:
         return INCOMPLETE
-    ended = parts.finish_chatter(task, fired, time_left(model, run, stop_cycle, stop_phase))
+    remaining = time_left(model, run, stop_cycle, stop_phase)
+    if has_clocks(model, run.mode):
+        remaining = min(remaining, next_tick(model, run)[1])
+    ended = parts.finish_chatter(task, fired, remaining)
     if ended and model.accumulates_to[run.last_fired] == NO_MODE:
         return ACCUMULATION
     return GO_ON
@@ -91,6 +102,8 @@ def enter(parts, task):
     model, run, mode = task.model, task.run, task.run.mode
     if not finite(run, model.dimension * (1 + task.tangents)):
         return NON_FINITE
+    if model.clocks.shape[0] > 0:
+        wind(model, run)
     fires = parts.enter(model, run, task.work)
     if fires == RESTING or (fires == NO_TRANSITION and parts.rests_on_guard(task)):
         if model.accumulates_to[run.last_fired] == NO_MODE:
@@ -209,6 +222,22 @@ def step_by_propagator(parts, task, remaining):
     return code, span
 
 
+@njit(**KERNEL)
+def fires_at_tick(parts, task, stop_cycle, stop_phase):
+    """The transition that fires first where a clock ticks: a clock, or one whose guard is reached as well."""
+    model, run = task.model, task.run
+    clock = ticking(model, run, task.work)
+    if clock == NO_TRANSITION:
+        return clock
+    fired = parts.arrived(task) if run.since_entry > 0.0 else NO_TRANSITION
+    if fired != NO_TRANSITION:
+        fired = parts.first_in_order(task, fired, stop_cycle, stop_phase)
+    if fired != NO_TRANSITION and fired < clock:
+        return fired
+    run.tick[clock] += 1
+    return clock
+
+
 @exported(INTEGER, Parts, Task, INTEGER, REAL, INTEGER, INTEGER)
 def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
     """Advance a run to the time ``stop_cycle`` periods and ``stop_phase``; returns a code.
@@ -233,6 +262,13 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
             if run.stage == ENTERING or run.pending != NO_TRANSITION:
                 continue
         remaining = time_left(model, run, stop_cycle, stop_phase)
+        clock, tick, band = NO_TRANSITION, math.inf, 0.0
+        if has_clocks(model, run.mode):
+            clock, tick = next_tick(model, run)
+            band = rounding_of_tick(model, run, clock, run.tick[clock]) if clock != NO_TRANSITION else 0.0
+            if tick <= band:
+                run.pending = fires_at_tick(parts, task, stop_cycle, stop_phase)
+                continue
         if remaining <= 0.0:
             fired = parts.arrived(task)
             if fired == NO_TRANSITION:
@@ -244,7 +280,9 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         if run.steps >= max_steps:
             return MAX_STEPS
         mode = run.mode
-        code, span = step(parts, task, remaining)
+        # A tick that is as good as at the end is there.
+        until = remaining if tick + band >= remaining else tick
+        code, span = step(parts, task, until)
         if code != GO_ON:
             return int(code)
         if run.pending != NO_TRANSITION:
@@ -259,7 +297,10 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         if task.tangents > 0 and task.orthonormal != 0 and 0.0 < span < remaining:
             parts.keep_apart(model, run, mode, task.tangents, task.work.jacobian)
         fired = run.pending
-        if span > remaining or (span >= remaining and fired == NO_TRANSITION):
-            set_clock(run, stop_cycle, stop_phase)
+        if span > until or (span >= until and fired == NO_TRANSITION):
+            if until < remaining:
+                go_to_tick(model, run, clock)
+            else:
+                set_clock(run, stop_cycle, stop_phase)
         if fired != NO_TRANSITION:
             run.pending = parts.first_in_order(task, fired, stop_cycle, stop_phase)

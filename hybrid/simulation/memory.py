@@ -74,6 +74,8 @@ class Memory:
         _clear_work(self.work, plan.work_layout, plan.method)
         run.cycle, run.phase = split_time(t0, model.period)
         run.horizon = horizon
+        if plan.ticks is not None:
+            run.ticks[:] = plan.ticks(state, model.parameters)
         y = run.y
         y[:n] = state
         if tangent is not None:
@@ -199,7 +201,7 @@ def record_layout(dimension: int, degree: int, steps: int, jumps: int) -> Any:
 
 
 @lru_cache(MOST_LAYOUTS)
-def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> Any:
+def run_layout(dimension: int, tangents: int, modes: int, transitions: int, ticks: int = 0) -> Any:
     """Where the arrays of a run lie, and what they hold in one that has no mode yet and has not jumped."""
     n = dimension
     shapes = {
@@ -213,6 +215,8 @@ def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> A
         "rehearsal": (4, transitions),
         "passed": (transitions,),
         "visits": (RECENT, n + 2),
+        "tick": (transitions,),
+        "ticks": (ticks,),
         "first_step": (modes,),
         "stay": (modes,),
         "scale": (n,),
@@ -228,5 +232,6 @@ def run_layout(dimension: int, tangents: int, modes: int, transitions: int) -> A
     first.stage, first.previous_mode = codes.ENTERING, codes.NO_MODE
     first.last_fired = first.pending = codes.NO_TRANSITION
     first.last_jump_phase = np.nan
+    first.tick[:] = codes.FIRST_TICK
     layout.begin_as(first)
     return layout

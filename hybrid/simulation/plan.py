@@ -54,6 +54,7 @@ class Plan:
     degree: int
     run_layout: Any
     work_layout: Any
+    ticks: Callable[[np.ndarray, np.ndarray], list[float]] | None = None
     spares: list[Memory] = attrs.field(factory=list, init=False)
 
     def memory(self) -> Memory:
@@ -132,8 +133,9 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: i
             model,
             {name: codes.PROPAGATORS[kind] for name, kind in zip(system.mode_names, kinds, strict=True)},
             dense_degree(compiled, method, kinds),
-            run_layout(n, tangents, modes, transitions),
+            run_layout(n, tangents, modes, transitions, system.first_tick[-1]),
             work_layout(method, n, tangents, columns, rows),
+            system.ticks if system.first_tick[-1] else None,
         )
         while len(compiled.plans) >= MOST_LAYOUTS:
             compiled.plans.pop(next(iter(compiled.plans)), None)

@@ -191,6 +191,8 @@ class Trajectory:
         run.cycle, run.phase, run.phase_low = before.cycle, before.phase, before.phase_low
         markers = len(run.side) - len(before.side)
         run.side[markers:], run.on_guard[markers:], run.due[:] = before.side, before.on_guard, 0
+        run.tick[markers:] = before.tick
+        run.entry_cycle, run.entry_phase, run.entry_low = before.entry_cycle, before.entry_phase, before.entry_low
         run.previous_mode = run.mode
 
     def jacobian(self) -> np.ndarray:

@@ -9,6 +9,7 @@ import attrs
 
 from hybrid import arguments
 from hybrid.errors import ModelError, shown
+from hybrid.system.clocks import Clock
 from hybrid.system.portable import Portable
 
 Function = Callable[..., Any]
@@ -164,11 +165,12 @@ class Mode(Portable):
     part_of: str | None = attrs.field(default=None, kw_only=True, validator=_optional_name)
 
 
-def _as_guard(value: Any) -> Guard:
-    if isinstance(value, Guard):
+def _as_guard(value: Any) -> Guard | Clock:
+    if isinstance(value, Guard | Clock):
         return value
     raise ModelError(
-        f"Transition: guard must be a Guard; got {shown(value)}. Write Guard(function, direction=...)."
+        f"Transition: guard must be a Guard or a clock; got {shown(value)}. Write Guard(function, "
+        "direction=...), Every(period), At(times) or After(duration)."
     )
 
 
@@ -193,7 +195,7 @@ class Transition(Portable):
         Names of modes. If the target is ``None``, the run ends where the transition fires, with the status
         ``TERMINAL``.
     guard
-        When the transition fires.
+        When the transition fires: a `Guard`, or a clock, one of `Every`, `At` and `After`.
     reset
         Map of the state at the jump; ``None`` is the identity.
     accumulates_to
@@ -225,7 +227,7 @@ class Transition(Portable):
 
     source: str = attrs.field(validator=_nonempty_name)
     target: str | None = attrs.field(validator=_optional_name)
-    guard: Guard = attrs.field(converter=_as_guard)
+    guard: Guard | Clock = attrs.field(converter=_as_guard)
     reset: Reset | None = attrs.field(default=None, converter=_as_reset)
     accumulates_to: str | None = attrs.field(default=None, kw_only=True, validator=_optional_name)
     name: str = attrs.field(kw_only=True, validator=_nonempty_name)
@@ -259,6 +261,11 @@ class Transition(Portable):
         if not (isinstance(self.source, str) and isinstance(target, str)):
             return ""  # their validators, which run later, say so
         return f"{self.source}->{target}"
+
+    @property
+    def clock(self) -> Clock | None:
+        """The clock that the transition has in the place of a guard, if it has one."""
+        return self.guard if isinstance(self.guard, Clock) else None
 
     @property
     def is_marker(self) -> bool:

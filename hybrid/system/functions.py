@@ -13,6 +13,7 @@ from hybrid.system.labels import plain_name
 from hybrid.system.variables import STATE
 
 CONDITION = "when"
+CLOCK = "clock"
 
 
 @attrs.frozen
@@ -117,10 +118,11 @@ def field_function(mode: Mode, dimension: int) -> ModelFunction:
 
 
 def guard_function(transition: Transition) -> ModelFunction:
-    """The guard of a transition."""
+    """The guard of a transition; of a clock, the time since its nearest tick."""
     guard = transition.guard
     owner = f"Transition {transition.name!r}"
-    return ModelFunction(owner, "guard", guard.function, "gradient", guard.gradient, None)
+    kind = "guard" if transition.clock is None else CLOCK
+    return ModelFunction(owner, kind, guard.function, "gradient", guard.gradient, None)
 
 
 def condition_function(transition: Transition) -> ModelFunction | None:

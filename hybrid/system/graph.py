@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
+from itertools import accumulate
 from html import escape
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
@@ -13,9 +14,10 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.display.tables import html_table, table, with_unit
-from hybrid.errors import ModelError, unknown_name
+from hybrid.errors import ArgumentError, ModelError, unknown_name
 from hybrid.system.checks import check_angles, check_functions
-from hybrid.system.elements import END, Mode, Transition
+from hybrid.system.clocks import Clock
+from hybrid.system.elements import END, Guard, Mode, Transition
 from hybrid.system.functions import ModelFunction, functions_in
 from hybrid.system.growth import Growth, grows
 from hybrid.system.laws import Laws, placed
@@ -241,8 +243,7 @@ class HybridSystem(Portable):
                 transition.name,
                 transition.source,
                 END if transition.target is None else transition.target,
-                GUARD_SIDES[transition.guard.direction]
-                + (", at the start" if transition.guard.at_start else ""),
+                _guard_told(transition.guard),
                 "" if transition.guard.when is None else "yes",
                 "" if transition.reset is None else "yes",
                 transition.accumulates_to or "",
@@ -256,7 +257,8 @@ class HybridSystem(Portable):
         values = self.parameter_values()
         found: dict[str, list[str]] = {}
         for mode in self.modes:
-            guards = [each.guard.function for each in self.transitions if each.source == mode.name]
+            leaving = [each for each in self.transitions if each.source == mode.name and not each.clock]
+            guards = [each.guard.function for each in leaving]
             names = switching_inside(self.variables, mode.field, guards, values)
             found |= {mode.name: names} if names else {}
         return found
@@ -292,6 +294,28 @@ class HybridSystem(Portable):
     def transition_names(self) -> tuple[str, ...]:
         """Names of the transitions in the order of their indices."""
         return tuple(transition.name for transition in self.transitions)
+
+    @cached_property
+    def first_tick(self) -> tuple[int, ...]:
+        """By transition: the place of the first number of its clock among those of all, and their count."""
+        counts = (0 if each.clock is None else len(each.clock.quantities) for each in self.transitions)
+        return tuple(accumulate(counts, initial=0))
+
+    def ticks(self, x: np.ndarray, parameters: np.ndarray) -> list[float]:
+        """The numbers of all clocks at a state and parameters; ArgumentError if one cannot be."""
+        view, p = self.variables.state_view(x), self.variables.parameter_view(parameters.tolist())
+        found: list[float] = []
+        for transition in self.transitions:
+            clock = transition.clock
+            if clock is not None:
+                numbers = tuple(map(float, clock.numbers(view, p)))
+                fault = clock.fault(numbers)
+                if fault:
+                    raise ArgumentError(
+                        f"Transition {transition.name!r}: {type(clock).__name__}: {fault} with these parameters."
+                    )
+                found += numbers
+        return found
 
     @cached_property
     def graph(self) -> nx.MultiDiGraph:
@@ -406,6 +430,13 @@ class HybridSystem(Portable):
                 f"HybridSystem: no transition joins mode {lonely[0]!r} to the others. Modes: "
                 f"{', '.join(self.mode_names)}. Add a transition, or make it a separate system."
             )
+
+
+def _guard_told(guard: Guard | Clock) -> str:
+    """When a transition fires, in few words."""
+    if isinstance(guard, Clock):
+        return guard.told
+    return GUARD_SIDES[guard.direction] + (", at the start" if guard.at_start else "")
 
 
 def check_mode(system: HybridSystem, name: object, what: str = "Mode") -> None:

@@ -10,6 +10,7 @@ import attrs
 
 from hybrid.expression.reads import names_read
 from hybrid.expression.values import TraceError
+from hybrid.system.clocks import Clock, Since
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem
@@ -32,9 +33,52 @@ def extended(system: HybridSystem, names: tuple[str, ...]) -> HybridSystem:
     return made[names]
 
 
+@attrs.frozen
+class MovedClock(Clock):
+    """A clock whose numbers depend on components of the state that were parameters.
+
+    ``parameters_of(x, p)`` are the parameters of the original.
+    """
+
+    clock: Clock
+    parameters_of: Callable[[Any, Any], Any]
+    when: Callable[..., Any] | None
+    function: Callable[..., Any] = attrs.field(
+        init=False, eq=False, repr=False, default=attrs.Factory(Since, takes_self=True)
+    )
+
+    @property
+    def number(self) -> int:  # type: ignore[override]
+        """The number of the original."""
+        return self.clock.number
+
+    @property
+    def quantities(self) -> tuple[Any, ...]:
+        """Those of the original."""
+        return self.clock.quantities
+
+    @property
+    def told(self) -> str:
+        """When the clock ticks, in few words."""
+        return self.clock.told
+
+    def numbers(self, x: Any, p: Any) -> tuple[Any, ...]:
+        """The numbers of the clock at a state and parameters."""
+        return self.clock.numbers(x, self.parameters_of(x, p))
+
+    def since_tick(self, t: Any, numbers: Any) -> Any:
+        """Time since the nearest tick, with the gradient in what moves it."""
+        return self.clock.since_tick(t, numbers)
+
+    def fault(self, numbers: Any) -> str:
+        """What is wrong with the numbers, in words."""
+        return self.clock.fault(numbers)
+
+
 class _Extension:
     def __init__(self, system: HybridSystem, names: tuple[str, ...]) -> None:
         self.original, self.names = system, names
+        self.places = {name: system.dimension + i for i, name in enumerate(names)}
         self.kept = tuple(name for name in system.parameters if name not in names)
 
     def system(self) -> HybridSystem:
@@ -68,11 +112,18 @@ class _Extension:
             values = self._function(WholeReset(reset.function, self.original.state))
             new = Reset(lambda t, x, p: (*values(t, x, p), *x[n:]))
         when = None if guard.when is None else self._function(guard.when)
-        moved = Guard(self._function(guard.function), guard.direction, when=when, at_start=guard.at_start)
+        moved: Guard | Clock
+        if isinstance(guard, Clock):
+            moved = MovedClock(guard, self._all_parameters, when)
+        else:
+            moved = Guard(self._function(guard.function), guard.direction, when=when, at_start=guard.at_start)
         return attrs.evolve(transition, guard=moved, reset=new)
 
     def _period(self) -> Any:
         period = self.original.period
+        if self.original.first_tick[-1]:
+            # The derivative of a tick in its period grows with its number, which no phase tells.
+            return None
         if not callable(period):
             return period
         try:
@@ -83,6 +134,9 @@ class _Extension:
             return None
         return lambda p: period(self._parameters(p, self.original.parameters.__getitem__))
 
+    def _all_parameters(self, x: Any, p: Any) -> Any:
+        return self._parameters(p, lambda name: x[self.places[name]])
+
     def _parameters(self, p: Any, moved: Callable[[str], Any]) -> Any:
         """All parameters of the original, those that are states from ``moved``."""
         names = tuple(self.original.parameters)
@@ -92,11 +146,10 @@ class _Extension:
     def _function(self, function: Callable[..., Any]) -> Callable[..., Any]:
         """A function of the original system as one of the extended state."""
         original, n = self.original, self.original.dimension
-        places = {name: n + i for i, name in enumerate(self.names)}
 
         def called(t: Any, x: Any, p: Any) -> Any:
             is_plain = isinstance(original.state, int)
             own = x[:n] if is_plain else named_values(STATE, original.state_names, x[:n])
-            return function(t, own, self._parameters(p, lambda name: x[places[name]]))
+            return function(t, own, self._all_parameters(x, p))
 
         return called

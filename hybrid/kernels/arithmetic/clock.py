@@ -11,6 +11,8 @@ from numba import njit
 
 from hybrid.kernels.types.options import INLINE, KERNEL
 
+# Factor that splits a number into an upper and a lower half of its digits.
+UPPER_HALF = 2.0**27 + 1.0
 # The rounding error of a sum is found only if the compiler keeps the order of the operations.
 IN_ORDER = KERNEL | {"fastmath": False}
 
@@ -21,6 +23,18 @@ def sum_in_two_parts(a, b):
     total = a + b
     part = total - a
     return total, (a - (total - part)) + (b - part)
+
+
+@njit(**IN_ORDER)
+def product_in_two_parts(a, b):
+    """``a * b``, rounded, and its rounding error (Dekker)."""
+    product = a * b
+    part = UPPER_HALF * a
+    high = part - (part - a)
+    part = UPPER_HALF * b
+    other = part - (part - b)
+    low, other_low = a - high, b - other
+    return product, ((high * other - product) + high * other_low + low * other) + low * other_low
 
 
 @njit(**IN_ORDER)

@@ -215,7 +215,7 @@ def move(model, run, transition, target, x_plus):
 def leave(model, run, transition, transversality, work):
     """Move the run past a jump to ``work.new``."""
     mode, target = run.mode, model.target[transition]
-    if mode == target and model.marker[transition] == 0:
+    if mode == target and model.marker[transition] == 0 and model.clock[transition] == 0:
         remember_impulse(model, run, transition, transversality, work)
     if target not in (NO_MODE, mode):
         carry_rounding(model, run, transition, run.phase, run.y, work.new, work.reset_jacobian, work.state)
@@ -274,8 +274,10 @@ def jump(task, transition):
     run.locked = 0
     # A locked jump inherits the grazing flag of the jump that triggered it.
     kind = run.last_kind if locked else TRANSVERSE
-    steep = tangents > 0 and not locked and is_steep(model, method, run, transition, tangents, work)
-    if not locked:
+    # The time of a tick is known.
+    searched = not locked and model.clock[transition] == 0
+    steep = tangents > 0 and searched and is_steep(model, method, run, transition, tangents, work)
+    if searched:
         keep_unknown_time(model, method, run, transition, work)
     if locked:
         recall_map(model, run, tangents, work)
@@ -286,7 +288,7 @@ def jump(task, transition):
         transversality = cross_with_map(model, run, transition, tangents, work)
     else:
         transversality = cross_without_map(model, run, transition, mode, work)
-    judged = asked and not locked and model.marker[transition] == 0
+    judged = asked and searched and model.marker[transition] == 0
     judged = judged and not ends_own_flight(model, run, transition, transversality)
     if judged and is_grazing(model, method, run, transition, transversality, work):
         kind = GRAZING

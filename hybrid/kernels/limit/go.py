@@ -52,7 +52,12 @@ from hybrid.kernels.types.task import task_of
 
 @njit(**KERNEL)
 def may_accumulate(model, run, transition):
-    """Whether ``finish_chatter`` may have something to do after a jump; cheap, and seldom true in vain."""
+    """Whether ``finish_chatter`` may have something to do after a jump; cheap, and seldom true in vain.
+
+    Ticks of a clock never come closer to each other.
+    """
+    if model.clock[transition] != 0:
+        return False
     if run.mode == run.previous_mode and model.marker[transition] == 0:
         return True
     return run.jumps_here > FEWEST_JUMPS or series_of_rounds(model, run).turn > 0

@@ -44,6 +44,11 @@ BY_NOTHING, BY_FLOW, BY_GUARD = range(3)
 # Target of a transition that ends the run, and limit of a chatter that names none.
 NO_MODE = -1
 
+# Kinds of clocks, as ``hybrid.system.clocks`` numbers them; 0 for a guard.
+EVERY, AT, AFTER = range(1, 4)
+# Number of the next tick of a clock that has not been wound up yet.
+FIRST_TICK = -(2**62)
+
 # What a guard says of the start of a run: nothing against it, that it lies on the guard and moves beyond, or
 # that it lies beyond.
 NO_OBJECTION = 0

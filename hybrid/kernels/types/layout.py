@@ -75,7 +75,8 @@ class Model(Structure):
     the series of its mode hold in a column; ``bound`` and ``spread`` run the ``programs`` of the others.
     Transitions with the same ``surface`` have the same guard up to a factor, its sign the product of their
     ``orientation``; ``paired`` is 1 for a transition whose mode has others that fire the other way across its
-    surface. ``accumulates_to`` is the mode after a complete chatter, or -1. ``propagator`` says how each mode
+    surface. ``clock`` is the kind of a transition's clock, 0 for one with a guard; clocks are not among
+    ``outgoing`` but in ``clocks[first_clock[m]:first_clock[m + 1]]``. ``accumulates_to`` is the mode after a complete chatter, or -1. ``propagator`` says how each mode
     is advanced; ``degree`` is that of its solutions in time where they are polynomials, else 0. ``fragile``
     is 1 for a mode whose series may be undefined where its field is not, ``abrupt`` for one whose field may
     change abruptly, ``bounded`` for one whose forcing can be bounded, so that no pulse in it is stepped over.
@@ -131,6 +132,10 @@ class Model(Structure):
     orientation: INDICES
     paired: INDICES
     marker: INDICES
+    clock: INDICES
+    first_clock: INDICES
+    clocks: INDICES
+    first_tick: INDICES
     accumulates_to: INDICES
     propagator: INDICES
     degree: INDICES
@@ -221,6 +226,7 @@ COUNTERS = (
     "ran_dry",
     "field_jumps",
     "jumped_in",
+    "entry_cycle",
 )
 NUMBERS = (
     "phase",
@@ -248,6 +254,8 @@ NUMBERS = (
     "longest_step",
     "unknown_time",
     "stretch_left",
+    "entry_phase",
+    "entry_low",
 )
 
 
@@ -265,6 +273,9 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
       guards before the crossings found on the last step.
     - ``passed (transitions,)``: the share of the last step at which each guard changed sides without firing
       before the crossing found on the step; then the middle between the two. ``NO_ROOT`` if it did not.
+    - ``tick (transitions,)``: the number of the next tick of each clock; ``ticks`` are the numbers of all
+      clocks, those of a transition from ``model.first_tick`` on: period and offset, or times, or a duration.
+      The mode was entered in the period ``entry_cycle`` at ``entry_phase``, and ``entry_low`` of rounding.
     - ``horizon``: how long the run takes, as far as it is known at its start; 0 if it is not.
     - ``longest_step``: the longest step in time so far; ``lateness``: the largest change that the rounding of
       the time made in a step or jump, in tolerances.
@@ -294,6 +305,8 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     rehearsal: INDEX_MATRIX
     passed: VECTOR
     visits: MATRIX
+    tick: INDICES
+    ticks: VECTOR
     first_step: VECTOR
     stay: VECTOR
     scale: VECTOR

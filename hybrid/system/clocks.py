@@ -1,0 +1,309 @@
+"""Clocks: transitions that fire at known times, in the place of a guard."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, ClassVar
+
+import attrs
+import numpy as np
+
+from hybrid import arguments
+from hybrid.errors import ModelError, shown
+from hybrid.system.portable import Portable
+
+# A number, the name of a parameter, or a function of ``p``.
+Quantity = Any
+Read = Callable[[Any], Any]
+
+
+def _as_quantity(kind: str, name: str, value: Any) -> Quantity:
+    """A quantity as the user gave it, checked as far as it can be without parameters."""
+    if callable(value) or (isinstance(value, str) and value.isidentifier()):
+        return value
+    number = None if isinstance(value, bool | str) else arguments.floats(value)
+    if number is None or number.shape != () or not math.isfinite(number):
+        raise ModelError(
+            f"{kind}: {name} must be a finite number, the name of a parameter, or a function of p; got "
+            f"{shown(value)}."
+        )
+    return float(number)
+
+
+def read(quantity: Quantity, p: Any) -> Any:
+    """The value of a quantity at parameters."""
+    if isinstance(quantity, str):
+        return getattr(p, quantity)
+    return quantity(p) if callable(quantity) else quantity
+
+
+def _short(quantity: Quantity) -> str:
+    """A quantity in few words."""
+    if isinstance(quantity, float):
+        return f"{quantity:.6g}"
+    return quantity if isinstance(quantity, str) else "f(p)"
+
+
+@attrs.frozen
+class Clock(Portable):
+    """What clocks have in common: each is a guard whose zeros in time are known, so none is searched for.
+
+    As a guard it is the time since its nearest tick, with the gradient that moves the tick with what its
+    numbers depend on.
+    """
+
+    # Clocks as the kernels number them.
+    number: ClassVar[int] = 0
+    direction: ClassVar[int] = 1
+    gradient: ClassVar[None] = None
+    at_start: ClassVar[bool] = False
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The numbers of the clock, as they were given."""
+        raise NotImplementedError
+
+    @property
+    def told(self) -> str:
+        """When the clock ticks, in few words."""
+        raise NotImplementedError
+
+    def numbers(self, x: Any, p: Any) -> tuple[Any, ...]:
+        """The numbers of the clock at a state and parameters; only parameters matter here."""
+        return tuple(read(quantity, p) for quantity in self.quantities)
+
+    def since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
+        """Time since the nearest tick, negative before it, at the clock's numbers."""
+        raise NotImplementedError
+
+    def fault(self, numbers: Sequence[float]) -> str:
+        """What is wrong with the numbers of the clock, in words; empty if they are right."""
+        raise NotImplementedError
+
+
+def _quantity(kind: str) -> Callable[[Any], Any]:
+    def converted(value: Any, instance: Any, field: Any) -> Quantity:
+        return _as_quantity(kind, field.name, value)
+
+    return attrs.Converter(converted, takes_self=True, takes_field=True)  # type: ignore[return-value]
+
+
+def _check_when(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
+    if value is not None and not callable(value):
+        raise ModelError(f"{type(instance).__name__}: when must be a function of (t, x, p); got {shown(value)}.")
+
+
+def _check_numbers(instance: Any) -> None:
+    """ModelError if numbers that do not hang on parameters are wrong."""
+    if all(isinstance(quantity, float) for quantity in instance.quantities):
+        fault = instance.fault(instance.quantities)
+        if fault:
+            raise ModelError(f"{type(instance).__name__}: {fault}.")
+
+
+@attrs.frozen
+class Since:
+    """The guard of a clock as a function: the time since the nearest tick."""
+
+    clock: Clock
+
+    def __call__(self, t: Any, x: Any, p: Any) -> Any:
+        return self.clock.since_tick(t, self.clock.numbers(x, p))
+
+
+@attrs.frozen
+class Every(Clock):
+    """A clock that ticks at ``offset + k period`` for every whole number ``k``, in the place of a guard.
+
+    Ticks are exact: no root is searched for, and none drifts however many there are. A tick at the start of
+    a run does not fire, one at its end does. A clock fires once at one instant, also if its mode is entered
+    at the instant of a tick; clocks that tick together, up to the rounding of their numbers, fire in the
+    order in which the transitions are listed.
+
+    Parameters
+    ----------
+    period, offset
+        Numbers in units of time, names of parameters, or functions of ``p``; the period is positive.
+    when
+        Optional condition ``c(t, x, p)``, as that of a `Guard`: a tick without it is passed over.
+
+    Raises
+    ------
+    ModelError
+        If a number is not finite, the period is not positive, or ``when`` is not a function.
+
+    Examples
+    --------
+    >>> import hybrid
+    >>> switch_off = hybrid.Transition("on", "off", hybrid.Every("T", offset=lambda p: p.d * p.T))
+    >>> switch_off.guard.period
+    'T'
+    """
+
+    period: Quantity = attrs.field(converter=_quantity("Every"))
+    offset: Quantity = attrs.field(default=0.0, converter=_quantity("Every"))
+    when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=_check_when)
+    function: Callable[..., Any] = attrs.field(
+        init=False, eq=False, repr=False, default=attrs.Factory(Since, takes_self=True)
+    )
+    number: ClassVar[int] = 1
+
+    def __attrs_post_init__(self) -> None:
+        _check_numbers(self)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Period and offset."""
+        return self.period, self.offset
+
+    @property
+    def told(self) -> str:
+        """When the clock ticks, in few words."""
+        return f"every {_short(self.period)}"
+
+    def since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
+        """Time since the nearest tick."""
+        period, offset = numbers
+        return t - offset - period * np.floor((t - offset) / period + 0.5)
+
+    def fault(self, numbers: Sequence[float]) -> str:
+        """What is wrong with period and offset."""
+        period, offset = numbers
+        if not 0.0 < period < math.inf:
+            return f"period must be positive and finite; got {period:.6g}"
+        return "" if math.isfinite(offset) else f"offset must be finite; got {offset:.6g}"
+
+
+def _as_times(value: Any) -> tuple[Quantity, ...]:
+    if isinstance(value, str) or callable(value):
+        value = (value,)
+    if not isinstance(value, Iterable):
+        raise ModelError(f"At: times must be a list of times; got {shown(value)}.")
+    found = tuple(_as_quantity("At", f"times[{i}]", each) for i, each in enumerate(value))
+    if not found:
+        raise ModelError("At: times must hold at least one time; got none.")
+    return found
+
+
+@attrs.frozen
+class At(Clock):
+    """A clock that ticks at listed times, in the place of a guard; a tick is found by a search, however many.
+
+    A tick at the start of a run does not fire, one at its end does. For more, see `Every`.
+
+    Parameters
+    ----------
+    times
+        Times in increasing order, each a number, the name of a parameter, or a function of ``p``.
+    when
+        Optional condition ``c(t, x, p)``, as that of a `Guard`: a tick without it is passed over.
+
+    Raises
+    ------
+    ModelError
+        If there is no time, one is not finite, they do not increase, or ``when`` is not a function.
+
+    Examples
+    --------
+    >>> import hybrid
+    >>> dose = hybrid.Transition(
+    ...     "run", "run", hybrid.At([0.0, 24.0, 48.0]), hybrid.Reset(lambda t, x, p: {"A": x.A + p.dose})
+    ... )
+    >>> len(dose.guard.times)
+    3
+    """
+
+    times: tuple[Quantity, ...] = attrs.field(converter=_as_times)
+    when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=_check_when)
+    function: Callable[..., Any] = attrs.field(
+        init=False, eq=False, repr=False, default=attrs.Factory(Since, takes_self=True)
+    )
+    number: ClassVar[int] = 2
+
+    def __attrs_post_init__(self) -> None:
+        _check_numbers(self)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The times."""
+        return self.times
+
+    @property
+    def told(self) -> str:
+        """When the clock ticks, in few words."""
+        return f"at {_short(self.times[0])}" if len(self.times) == 1 else f"at {len(self.times)} times"
+
+    def since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
+        """Time since the nearest of the times that depend on parameters, or of the first."""
+        moving = [each for given, each in zip(self.times, numbers, strict=True) if not isinstance(given, float)]
+        nearest = moving[0] if moving else numbers[0]
+        for each in moving[1:]:
+            nearest = np.where(np.abs(t - each) < np.abs(t - nearest), each, nearest)
+        return t - nearest
+
+    def fault(self, numbers: Sequence[float]) -> str:
+        """What is wrong with the times."""
+        for i, (before, after) in enumerate(zip(numbers[:1] + numbers[:-1], numbers, strict=True)):
+            if not math.isfinite(after):
+                return f"times[{i}] must be finite; got {after:.6g}"
+            if i and not after > before:
+                return f"times must increase; got times[{i}] = {after:.10g} after {before:.10g}"
+        return ""
+
+
+@attrs.frozen
+class After(Clock):
+    """A clock that ticks once, so long after its mode was entered, in the place of a guard.
+
+    The start of a run is an entry. A transition from the mode to itself enters it anew, unless it has no
+    reset and so changes nothing.
+
+    Parameters
+    ----------
+    duration
+        A positive number in units of time, the name of a parameter, or a function of ``p``.
+    when
+        Optional condition ``c(t, x, p)``, as that of a `Guard`: a tick without it is passed over.
+
+    Raises
+    ------
+    ModelError
+        If the duration is not positive and finite, or ``when`` is not a function.
+
+    Examples
+    --------
+    >>> import hybrid
+    >>> recovered = hybrid.Transition("rest", "rise", hybrid.After("refractory"))
+    >>> recovered.guard.duration
+    'refractory'
+    """
+
+    duration: Quantity = attrs.field(converter=_quantity("After"))
+    when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=_check_when)
+    function: Callable[..., Any] = attrs.field(
+        init=False, eq=False, repr=False, default=attrs.Factory(Since, takes_self=True)
+    )
+    number: ClassVar[int] = 3
+
+    def __attrs_post_init__(self) -> None:
+        _check_numbers(self)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The duration."""
+        return (self.duration,)
+
+    @property
+    def told(self) -> str:
+        """When the clock ticks, in few words."""
+        return f"after {_short(self.duration)}"
+
+    def since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
+        """Time since the tick of a mode that was entered at time 0."""
+        return t - numbers[0]
+
+    def fault(self, numbers: Sequence[float]) -> str:
+        """What is wrong with the duration."""
+        [duration] = numbers
+        return "" if 0.0 < duration < math.inf else f"duration must be positive and finite; got {duration:.6g}"
