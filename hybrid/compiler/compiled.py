@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
 from itertools import accumulate, chain
@@ -22,8 +22,10 @@ from hybrid.compiler.parts import EVENTS, FIELDS, SERIES, TANGENT_SERIES, VARIAT
 from hybrid.compiler.surfaces import is_paired
 from hybrid.compiler.traced import key_of
 from hybrid.errors import ArgumentError, ModelError
-from hybrid.kernels.types.codes import DESINGULARISED, NARROW, NO_MODE, ROOTED, RUNGE_KUTTA
+from hybrid.kernels.types.codes import AT, DESINGULARISED, NARROW, NO_MODE, ROOTED, RUNGE_KUTTA
 from hybrid.kernels.types.layout import Model, Programs
+from hybrid.system.clocks import At, Every
+from hybrid.system.elements import Transition
 from hybrid.system.functions import CLOCK, CONDITION, ModelFunction
 from hybrid.system.graph import HybridSystem, as_system, functions_of, watched_by
 from hybrid.system.periodicity import period_at, period_fault
@@ -284,6 +286,10 @@ class CompiledSystem:
             first_clock=first_clock,
             clocks=clocks,
             first_tick=_indices(system.first_tick),
+            tick_of=_indices(_first_like(len(transitions), lambda i: _own_name(transitions[i]))),
+            clock_of=_indices(_first_like(len(transitions), self._clock_key)),
+            whole_mode=_indices(system.whole_modes.index(each.part_of or each.name) for each in system.modes),
+            enters=_indices(_enters(system, each) for each in transitions),
             target=_indices(_index_or_none(system, transition.target) for transition in transitions),
             direction=_indices(transition.guard.direction for transition in transitions),
             programs=self._programs,
@@ -313,6 +319,13 @@ class CompiledSystem:
             period=0.0,
         )
 
+    def _clock_key(self, index: int) -> Any:
+        """The same for two transitions with the same clock."""
+        clock = self.system.transitions[index].clock
+        if clock is None:
+            return index
+        return type(clock), self.emitted.surface[index], clock.quantities if clock.number == AT else ()
+
     @cached_property
     def is_smooth(self) -> bool:
         """Whether no field jumps or has an infinite slope inside of its mode."""
@@ -320,9 +333,10 @@ class CompiledSystem:
 
     @property
     def is_timed(self) -> bool:
-        """Whether a field, a guard or a reset may depend on time."""
+        """Whether a field, a guard, a clock or a reset may depend on time."""
         emitted = self.emitted
-        return not all(emitted.autonomous) or any(emitted.timed_guard) or any(emitted.timed_reset)
+        ticks = any(isinstance(each.guard, Every | At) for each in self.system.transitions)
+        return ticks or not all(emitted.autonomous) or any(emitted.timed_guard) or any(emitted.timed_reset)
 
     def _is_timed(self, mode: int) -> bool:
         """Whether the field of a mode, or one of the guards in it, may depend on time."""
@@ -343,6 +357,29 @@ def _leaving(system: HybridSystem, *, at_start: bool) -> tuple[np.ndarray, np.nd
         ]
         first.append(len(indices))
     return _indices(first), _indices(indices)
+
+
+def _own_name(transition: Transition) -> str:
+    """The name of a transition before its system was split."""
+    return transition.part_of or transition.name
+
+
+def _first_like(count: int, key: Callable[[int], Any]) -> list[int]:
+    """For each of so many items the first one with the same key."""
+    first: dict[Any, int] = {}
+    return [first.setdefault(key(i), i) for i in range(count)]
+
+
+def _enters(system: HybridSystem, transition: Transition) -> bool:
+    """Whether a transition enters its target anew: not if it marks, or leads to another part of its mode."""
+    if transition.target is None or transition.is_marker:
+        return False
+    source, target = (
+        system.modes[system.mode_index(name)] for name in (transition.source, transition.target)
+    )
+    return not (
+        transition.part_of is None and source.part_of is not None and source.part_of == target.part_of
+    )
 
 
 def _clocks(system: HybridSystem) -> tuple[np.ndarray, np.ndarray]:

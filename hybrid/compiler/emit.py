@@ -474,8 +474,7 @@ def _guards_in_series(system: HybridSystem, propagators: Sequence[Propagator]) -
     """By transition: whether the series of its source mode hold its guard; none follow guards of a start."""
     held = {mode: iter(each.guards) for mode, each in zip(system.mode_names, propagators, strict=True)}
     return tuple(
-        _is_crossed(transition) and next(held[transition.source], False)
-        for transition in system.transitions
+        _is_crossed(transition) and next(held[transition.source], False) for transition in system.transitions
     )
 
 

@@ -9,7 +9,7 @@ from hybrid.kernels.events.clocks import (
     go_to_tick,
     has_clocks,
     next_tick,
-    rounding_of_tick,
+    pass_tick,
     ticking,
     wind,
 )
@@ -234,7 +234,7 @@ def fires_at_tick(parts, task, stop_cycle, stop_phase):
         fired = parts.first_in_order(task, fired, stop_cycle, stop_phase)
     if fired != NO_TRANSITION and fired < clock:
         return fired
-    run.tick[clock] += 1
+    pass_tick(model, run, clock, True)
     return clock
 
 
@@ -264,8 +264,7 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         remaining = time_left(model, run, stop_cycle, stop_phase)
         clock, tick, band = NO_TRANSITION, math.inf, 0.0
         if has_clocks(model, run.mode):
-            clock, tick = next_tick(model, run)
-            band = rounding_of_tick(model, run, clock, run.tick[clock]) if clock != NO_TRANSITION else 0.0
+            clock, tick, band = next_tick(model, run)
             if tick <= band:
                 run.pending = fires_at_tick(parts, task, stop_cycle, stop_phase)
                 continue

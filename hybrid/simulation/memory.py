@@ -216,6 +216,7 @@ def run_layout(dimension: int, tangents: int, modes: int, transitions: int, tick
         "passed": (transitions,),
         "visits": (RECENT, n + 2),
         "tick": (transitions,),
+        "ticked": (transitions,),
         "ticks": (ticks,),
         "first_step": (modes,),
         "stay": (modes,),
@@ -232,6 +233,6 @@ def run_layout(dimension: int, tangents: int, modes: int, transitions: int, tick
     first.stage, first.previous_mode = codes.ENTERING, codes.NO_MODE
     first.last_fired = first.pending = codes.NO_TRANSITION
     first.last_jump_phase = np.nan
-    first.tick[:] = codes.FIRST_TICK
+    first.tick[:] = first.ticked[:] = codes.FIRST_TICK
     layout.begin_as(first)
     return layout

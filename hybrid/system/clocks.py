@@ -45,7 +45,6 @@ def _short(quantity: Quantity) -> str:
     return quantity if isinstance(quantity, str) else "f(p)"
 
 
-@attrs.frozen
 class Clock(Portable):
     """What clocks have in common: each is a guard whose zeros in time are known, so none is searched for.
 
@@ -53,11 +52,23 @@ class Clock(Portable):
     numbers depend on.
     """
 
+    __slots__ = ()
+
     # Clocks as the kernels number them.
     number: ClassVar[int] = 0
     direction: ClassVar[int] = 1
     gradient: ClassVar[None] = None
     at_start: ClassVar[bool] = False
+
+    @property
+    def function(self) -> Callable[..., Any]:
+        """The clock as a guard."""
+        raise NotImplementedError
+
+    @property
+    def when(self) -> Callable[..., Any] | None:
+        """The condition of a tick, if there is one."""
+        raise NotImplementedError
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -82,16 +93,23 @@ class Clock(Portable):
         raise NotImplementedError
 
 
-def _quantity(kind: str) -> Callable[[Any], Any]:
-    def converted(value: Any, instance: Any, field: Any) -> Quantity:
-        return _as_quantity(kind, field.name, value)
+def _as_period(value: Any) -> Quantity:
+    return _as_quantity("Every", "period", value)
 
-    return attrs.Converter(converted, takes_self=True, takes_field=True)  # type: ignore[return-value]
+
+def _as_offset(value: Any) -> Quantity:
+    return _as_quantity("Every", "offset", value)
+
+
+def _as_duration(value: Any) -> Quantity:
+    return _as_quantity("After", "duration", value)
 
 
 def _check_when(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
     if value is not None and not callable(value):
-        raise ModelError(f"{type(instance).__name__}: when must be a function of (t, x, p); got {shown(value)}.")
+        raise ModelError(
+            f"{type(instance).__name__}: when must be a function of (t, x, p); got {shown(value)}."
+        )
 
 
 def _check_numbers(instance: Any) -> None:
@@ -109,6 +127,7 @@ class Since:
     clock: Clock
 
     def __call__(self, t: Any, x: Any, p: Any) -> Any:
+        """The time since the nearest tick, negative before it."""
         return self.clock.since_tick(t, self.clock.numbers(x, p))
 
 
@@ -141,8 +160,8 @@ class Every(Clock):
     'T'
     """
 
-    period: Quantity = attrs.field(converter=_quantity("Every"))
-    offset: Quantity = attrs.field(default=0.0, converter=_quantity("Every"))
+    period: Quantity = attrs.field(converter=_as_period)
+    offset: Quantity = attrs.field(default=0.0, converter=_as_offset)
     when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=_check_when)
     function: Callable[..., Any] = attrs.field(
         init=False, eq=False, repr=False, default=attrs.Factory(Since, takes_self=True)
@@ -235,20 +254,21 @@ class At(Clock):
         return f"at {_short(self.times[0])}" if len(self.times) == 1 else f"at {len(self.times)} times"
 
     def since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
-        """Time since the nearest of the times that depend on parameters, or of the first."""
-        moving = [each for given, each in zip(self.times, numbers, strict=True) if not isinstance(given, float)]
-        nearest = moving[0] if moving else numbers[0]
-        for each in moving[1:]:
+        """Time since the nearest time; since the first one if no parameter moves any."""
+        nearest = numbers[0]
+        for each in numbers[1:] if not all(isinstance(given, float) for given in self.times) else ():
             nearest = np.where(np.abs(t - each) < np.abs(t - nearest), each, nearest)
         return t - nearest
 
     def fault(self, numbers: Sequence[float]) -> str:
         """What is wrong with the times."""
-        for i, (before, after) in enumerate(zip(numbers[:1] + numbers[:-1], numbers, strict=True)):
+        before = -math.inf
+        for i, after in enumerate(numbers):
             if not math.isfinite(after):
                 return f"times[{i}] must be finite; got {after:.6g}"
-            if i and not after > before:
+            if not after > before:
                 return f"times must increase; got times[{i}] = {after:.10g} after {before:.10g}"
+            before = after
         return ""
 
 
@@ -279,7 +299,7 @@ class After(Clock):
     'refractory'
     """
 
-    duration: Quantity = attrs.field(converter=_quantity("After"))
+    duration: Quantity = attrs.field(converter=_as_duration)
     when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=_check_when)
     function: Callable[..., Any] = attrs.field(
         init=False, eq=False, repr=False, default=attrs.Factory(Since, takes_self=True)
@@ -306,4 +326,48 @@ class After(Clock):
     def fault(self, numbers: Sequence[float]) -> str:
         """What is wrong with the duration."""
         [duration] = numbers
-        return "" if 0.0 < duration < math.inf else f"duration must be positive and finite; got {duration:.6g}"
+        return (
+            "" if 0.0 < duration < math.inf else f"duration must be positive and finite; got {duration:.6g}"
+        )
+
+
+@attrs.frozen
+class DerivedClock(Clock):
+    """A clock in a system that was made from another one.
+
+    ``read(x, p)`` gives its numbers, from a state that may hold what were parameters, or in other units.
+    """
+
+    clock: Clock
+    read: Callable[[Any, Any], Sequence[Any]]
+    when: Callable[..., Any] | None
+    function: Callable[..., Any] = attrs.field(
+        init=False, eq=False, repr=False, default=attrs.Factory(Since, takes_self=True)
+    )
+
+    @property
+    def number(self) -> int:  # type: ignore[override]
+        """That of the original."""
+        return self.clock.number
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Those of the original."""
+        return self.clock.quantities
+
+    @property
+    def told(self) -> str:
+        """When the clock ticks, in few words."""
+        return self.clock.told
+
+    def numbers(self, x: Any, p: Any) -> tuple[Any, ...]:
+        """The numbers of the clock at a state and parameters."""
+        return tuple(self.read(x, p))
+
+    def since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
+        """Time since the nearest tick."""
+        return self.clock.since_tick(t, numbers)
+
+    def fault(self, numbers: Sequence[float]) -> str:
+        """What is wrong with the numbers, in words."""
+        return self.clock.fault(numbers)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
-from itertools import accumulate
 from html import escape
+from itertools import accumulate
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
@@ -311,9 +311,8 @@ class HybridSystem(Portable):
                 numbers = tuple(map(float, clock.numbers(view, p)))
                 fault = clock.fault(numbers)
                 if fault:
-                    raise ArgumentError(
-                        f"Transition {transition.name!r}: {type(clock).__name__}: {fault} with these parameters."
-                    )
+                    owner = f"Transition {transition.name!r}: {type(clock).__name__}"
+                    raise ArgumentError(f"{owner}: {fault} with these parameters.")
                 found += numbers
         return found
 

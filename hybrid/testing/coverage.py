@@ -12,6 +12,7 @@ from hybrid.expression.reads import names_read
 from hybrid.expression.values import TraceError
 from hybrid.simulation.arc import HybridArc
 from hybrid.status import StatusCode
+from hybrid.system.clocks import Clock
 from hybrid.system.derivatives import evaluate
 from hybrid.system.elements import Function, Guard, Mode, Transition
 from hybrid.system.graph import HybridSystem
@@ -235,7 +236,7 @@ class Coverage:
         )
 
 
-def _side(case: Case, guard: Guard, t: float, x: np.ndarray) -> list[float]:
+def _side(case: Case, guard: Guard | Clock, t: float, x: np.ndarray) -> list[float]:
     """The sign of a guard, or nothing where it has no value."""
     values = evaluate(case.system.variables, guard.function, t, x, case.values)
     return [] if values is None else [float(np.sign(values[0]))]

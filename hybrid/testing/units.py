@@ -10,6 +10,7 @@ import attrs
 
 from hybrid.compiler.compiled import compile_system
 from hybrid.solvers import Solver
+from hybrid.system.clocks import Clock, DerivedClock
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem
@@ -155,8 +156,17 @@ def _measured(system: HybridSystem) -> Measured:
             declared = declared(named_values(PARAMETERS, names, p[: len(names)]))
         return getattr(p, time) * declared
 
-    def guard(transition: Transition) -> Guard:
+    def slower(clock: Clock) -> Callable[..., Any]:
+        def numbers(x: Any, p: Any) -> list[Any]:
+            own = clock.numbers(x, named_values(PARAMETERS, names, p[: len(names)]))
+            return [getattr(p, time) * number for number in own]
+
+        return numbers
+
+    def guard(transition: Transition) -> Guard | Clock:
         own, when = transition.guard, transition.guard.when
+        if isinstance(own, Clock):
+            return DerivedClock(own, slower(own), None if when is None else original(when, transition.source))
         return Guard(
             original(own.function, transition.source),
             own.direction,

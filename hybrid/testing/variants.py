@@ -203,15 +203,17 @@ def _freed(
         added = g(t, x, p)
         return [value + getattr(p, name) * added for value, name in zip(values, multiples, strict=True)]
 
+    # The zeros of a clock are its ticks, whatever the factor.
+    guard = transition.clock or Guard(
+        scaled_guard,
+        transition.guard.direction,
+        when=unaware(transition.guard.when),
+        at_start=transition.guard.at_start,
+        gradient=None if gradient is None else scaled_gradient,
+    )
     return attrs.evolve(
         transition,
-        guard=Guard(
-            scaled_guard,
-            transition.guard.direction,
-            when=unaware(transition.guard.when),
-            at_start=transition.guard.at_start,
-            gradient=None if gradient is None else scaled_gradient,
-        ),
+        guard=guard,
         # A marker stays one, and where a run ends nothing is reset.
         reset=None if transition.is_marker or transition.target is None else Reset(map_off_guard),
     )

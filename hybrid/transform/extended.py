@@ -10,7 +10,7 @@ import attrs
 
 from hybrid.expression.reads import names_read
 from hybrid.expression.values import TraceError
-from hybrid.system.clocks import Clock, Since
+from hybrid.system.clocks import Clock, DerivedClock
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem
@@ -31,48 +31,6 @@ def extended(system: HybridSystem, names: tuple[str, ...]) -> HybridSystem:
     if names not in made:
         made[names] = _Extension(system, names).system()
     return made[names]
-
-
-@attrs.frozen
-class MovedClock(Clock):
-    """A clock whose numbers depend on components of the state that were parameters.
-
-    ``parameters_of(x, p)`` are the parameters of the original.
-    """
-
-    clock: Clock
-    parameters_of: Callable[[Any, Any], Any]
-    when: Callable[..., Any] | None
-    function: Callable[..., Any] = attrs.field(
-        init=False, eq=False, repr=False, default=attrs.Factory(Since, takes_self=True)
-    )
-
-    @property
-    def number(self) -> int:  # type: ignore[override]
-        """The number of the original."""
-        return self.clock.number
-
-    @property
-    def quantities(self) -> tuple[Any, ...]:
-        """Those of the original."""
-        return self.clock.quantities
-
-    @property
-    def told(self) -> str:
-        """When the clock ticks, in few words."""
-        return self.clock.told
-
-    def numbers(self, x: Any, p: Any) -> tuple[Any, ...]:
-        """The numbers of the clock at a state and parameters."""
-        return self.clock.numbers(x, self.parameters_of(x, p))
-
-    def since_tick(self, t: Any, numbers: Any) -> Any:
-        """Time since the nearest tick, with the gradient in what moves it."""
-        return self.clock.since_tick(t, numbers)
-
-    def fault(self, numbers: Any) -> str:
-        """What is wrong with the numbers, in words."""
-        return self.clock.fault(numbers)
 
 
 class _Extension:
@@ -114,7 +72,8 @@ class _Extension:
         when = None if guard.when is None else self._function(guard.when)
         moved: Guard | Clock
         if isinstance(guard, Clock):
-            moved = MovedClock(guard, self._all_parameters, when)
+            numbers = guard.numbers
+            moved = DerivedClock(guard, lambda x, p: numbers(x, self._all_parameters(x, p)), when)
         else:
             moved = Guard(self._function(guard.function), guard.direction, when=when, at_start=guard.at_start)
         return attrs.evolve(transition, guard=moved, reset=new)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from functools import reduce
 from itertools import chain, count, islice, product
 from threading import RLock
-from typing import Any
+from typing import Any, cast
 
 import attrs
 import numpy as np
@@ -20,6 +20,7 @@ from hybrid.expression.operations import And, Less, LessEqual, Not, Or
 from hybrid.expression.surfaces import Surfaces
 from hybrid.expression.switches import Resolved, Switches
 from hybrid.expression.tracing import TraceError, model_symbols, trace
+from hybrid.system.clocks import Clock
 from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
@@ -225,6 +226,8 @@ class Splitter:
         return Pieces(index, field, watched, self.variables, self.surfaces)
 
     def _guard(self, transition: Transition) -> Expression | None:
+        if transition.clock is not None:
+            return None
         try:
             [guard] = trace(transition.guard.function, self.variables.state, self.variables.parameter_names)
         except TraceError:
@@ -405,7 +408,7 @@ class Splitter:
             copy = attrs.evolve(
                 transition,
                 target=self.name_of(landing.cell),
-                guard=attrs.evolve(guard, when=when),
+                guard=attrs.evolve(cast(Any, guard), when=when),
                 reset=transition.reset if after == outgoing.reset else Reset(expressed(after or ())),
                 name=copy_name(transition.name, own, to if len(landings) > 1 else ""),
                 **new,
@@ -417,10 +420,10 @@ class Splitter:
         [value] = self._traced("a condition of a guard", condition)
         return Less(ZERO, value)
 
-    def _smooth_guard(self, cell: Cell, outgoing: _Outgoing) -> Guard:
+    def _smooth_guard(self, cell: Cell, outgoing: _Outgoing) -> Guard | Clock:
         """The guard of a user's transition with the branches of a cell; as it is if it has none."""
         guard = outgoing.transition.guard
-        if outgoing.guard is None:
+        if outgoing.guard is None or isinstance(guard, Clock):
             return guard
         result = Switches([outgoing.guard], self.surfaces).resolved(_upper(cell.branches))
         assert isinstance(result, Resolved), "a cell decides every switch of its guards"

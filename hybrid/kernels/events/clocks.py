@@ -68,7 +68,7 @@ def first_from(model, run, transition, beyond):
     kind, first = model.clock[transition], model.first_tick[transition]
     now = run.cycle * model.period + run.phase
     if kind == EVERY:
-        k = int(math.floor((now - run.ticks[first + 1]) / run.ticks[first])) - 1
+        k = math.floor((now - run.ticks[first + 1]) / run.ticks[first]) - 1
     else:
         k, high = 0, model.first_tick[transition + 1] - first
         while k < high:
@@ -90,37 +90,62 @@ def first_from(model, run, transition, beyond):
 def wind(model, run):
     """Wind up the clocks of the mode that has just been entered.
 
-    A tick of this instant is still ahead, unless the clock has ticked already or the run starts here.
+    A tick of this instant is still ahead, unless the transition has fired at it or the run starts here. If
+    another mode was left at a tick of the same clock, that was its tick: two modes may take turns.
     """
     mode, starts = run.mode, run.last_fired == NO_TRANSITION
-    if starts or model.marker[run.last_fired] == 0:
+    entered = starts or model.enters[run.last_fired] == 1
+    moved = not starts and model.whole_mode[run.previous_mode] != model.whole_mode[mode]
+    if entered:
         run.entry_cycle, run.entry_phase, run.entry_low = run.cycle, run.phase, run.phase_low
     for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
         transition = model.clocks[slot]
+        own = model.tick_of[transition]
         if model.clock[transition] == AFTER:
-            if starts or model.marker[run.last_fired] == 0:
-                run.tick[transition] = 0
-        else:
-            k = first_from(model, run, transition, starts)
-            run.tick[transition] = max(run.tick[transition], k)
+            run.tick[own] = 0 if entered else run.tick[own]
+            continue
+        run.tick[own] = max(run.tick[own], first_from(model, run, transition, starts))
+        if moved:
+            run.tick[own] = max(run.tick[own], run.ticked[model.clock_of[transition]])
+
+
+@njit(**INLINE)
+def number_of_tick(model, run, transition):
+    """The number of the next tick of a clock."""
+    return run.tick[model.tick_of[transition]]
+
+
+@njit(**KERNEL)
+def pass_tick(model, run, transition, fires):
+    """Count the next tick of a clock as over; ``fires`` if it has fired the transition."""
+    own, clock = model.tick_of[transition], model.clock_of[transition]
+    run.tick[own] += 1
+    if fires:
+        run.ticked[clock] = max(run.ticked[clock], run.tick[own])
 
 
 @njit(**KERNEL)
 def next_tick(model, run):
-    """The clock of the mode that ticks first, and the time until then; infinite without any."""
+    """The clock of the mode that ticks first, the time until then, and how far rounding may move it.
+
+    Without any clock the time is infinite.
+    """
     mode, found, least = run.mode, NO_TRANSITION, math.inf
     for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
         transition = model.clocks[slot]
-        left = until(run, place_of_tick(model, run, transition, run.tick[transition]))
+        k = number_of_tick(model, run, transition)
+        left = until(run, place_of_tick(model, run, transition, k))
         if left < least:
             found, least = transition, left
-    return found, least
+    if found == NO_TRANSITION:
+        return found, least, 0.0
+    return found, least, rounding_of_tick(model, run, found, number_of_tick(model, run, found))
 
 
 @njit(**KERNEL)
 def go_to_tick(model, run, transition):
     """Set the clock of the run to the next tick of a clock."""
-    high, low = place_of_tick(model, run, transition, run.tick[transition])
+    high, low = place_of_tick(model, run, transition, number_of_tick(model, run, transition))
     while model.period > 0.0 and high >= model.period:
         high, lost = sum_in_two_parts(high, -model.period)
         high, low = sum_in_two_parts(high, lost + low)
@@ -134,11 +159,11 @@ def ticking(model, run, work):
     mode = run.mode
     for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
         transition = model.clocks[slot]
-        k = run.tick[transition]
+        k = number_of_tick(model, run, transition)
         left = until(run, place_of_tick(model, run, transition, k))
         if left > rounding_of_tick(model, run, transition, k):
             continue
         if allowed(model, transition, run.phase, run.y, work.scalar):
             return transition
-        run.tick[transition] += 1
+        pass_tick(model, run, transition, False)
     return NO_TRANSITION

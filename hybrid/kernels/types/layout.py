@@ -76,7 +76,10 @@ class Model(Structure):
     Transitions with the same ``surface`` have the same guard up to a factor, its sign the product of their
     ``orientation``; ``paired`` is 1 for a transition whose mode has others that fire the other way across its
     surface. ``clock`` is the kind of a transition's clock, 0 for one with a guard; clocks are not among
-    ``outgoing`` but in ``clocks[first_clock[m]:first_clock[m + 1]]``. ``accumulates_to`` is the mode after a complete chatter, or -1. ``propagator`` says how each mode
+    ``outgoing`` but in ``clocks[first_clock[m]:first_clock[m + 1]]``. Copies of one transition in a system
+    that has been split count the ticks of ``tick_of``, and transitions with the same clock have the same
+    ``clock_of``. ``whole_mode`` is the mode that one is a part of, and ``enters`` 1 for a transition that
+    enters its target anew. ``accumulates_to`` is the mode after a complete chatter, or -1. ``propagator`` says how each mode
     is advanced; ``degree`` is that of its solutions in time where they are polynomials, else 0. ``fragile``
     is 1 for a mode whose series may be undefined where its field is not, ``abrupt`` for one whose field may
     change abruptly, ``bounded`` for one whose forcing can be bounded, so that no pulse in it is stepped over.
@@ -136,6 +139,10 @@ class Model(Structure):
     first_clock: INDICES
     clocks: INDICES
     first_tick: INDICES
+    tick_of: INDICES
+    clock_of: INDICES
+    whole_mode: INDICES
+    enters: INDICES
     accumulates_to: INDICES
     propagator: INDICES
     degree: INDICES
@@ -273,7 +280,8 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
       guards before the crossings found on the last step.
     - ``passed (transitions,)``: the share of the last step at which each guard changed sides without firing
       before the crossing found on the step; then the middle between the two. ``NO_ROOT`` if it did not.
-    - ``tick (transitions,)``: the number of the next tick of each clock; ``ticks`` are the numbers of all
+    - ``tick (transitions,)``: the number of the next tick of each transition; ``ticked (transitions,)``: that
+      of the first tick of a clock that has not fired anything yet. ``ticks`` are the numbers of all
       clocks, those of a transition from ``model.first_tick`` on: period and offset, or times, or a duration.
       The mode was entered in the period ``entry_cycle`` at ``entry_phase``, and ``entry_low`` of rounding.
     - ``horizon``: how long the run takes, as far as it is known at its start; 0 if it is not.
@@ -306,6 +314,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     passed: VECTOR
     visits: MATRIX
     tick: INDICES
+    ticked: INDICES
     ticks: VECTOR
     first_step: VECTOR
     stay: VECTOR

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 import hybrid
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import After, At, Every, Guard, HybridSystem, Mode, Reset, Transition
 from tests.hybrid.arguments.values import (
     ANGLES,
     BALL,
@@ -15,6 +15,7 @@ from tests.hybrid.arguments.values import (
     LIMIT,
     LIST,
     NAME,
+    QUANTITY,
     SYSTEM,
     TEXT,
     UNITS,
@@ -132,6 +133,9 @@ def systems():
                 "when": FUNCTION,
             },
         ),
+        (call(Every, 1.0), {"period": QUANTITY, "offset": [*QUANTITY[:-2], math.inf], "when": FUNCTION}),
+        (call(At, [1.0, 2.0]), {"times": [*QUANTITY[:-2], [], [2.0, 1.0], [math.nan]], "when": FUNCTION}),
+        (call(After, 1.0), {"duration": QUANTITY, "when": FUNCTION}),
         (call(Reset, lambda t, x, p: x), {"function": [None, *FUNCTION], "jacobian": FUNCTION}),
         (
             call(Transition, "a", "a", Guard(lambda t, x, p: x.q)),

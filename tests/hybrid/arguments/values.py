@@ -141,6 +141,7 @@ OF_BALL = [
 ]
 SOLVER = ["DOP853", hybrid.DOP853, 3, 0, False, "", [hybrid.DOP853()], Odd()]
 FUNCTION = ["a", 3, True, [1], np.array([1.0])]
+QUANTITY = [None, "1a", True, [1, None], 1j, Odd(), math.nan, -1.0, 0.0]
 GUARD = [None, "a", 3, lambda t, x, p: x.q, Guard, Odd()]
 LIST = [Hostile(), None, "a", 3, True, math.nan, Odd()]
 AXES = ["a", 3, math.nan, True, Odd()]
