@@ -374,12 +374,9 @@ def _enters(system: HybridSystem, transition: Transition) -> bool:
     """Whether a transition enters its target anew: not if it marks, or leads to another part of its mode."""
     if transition.target is None or transition.is_marker:
         return False
-    source, target = (
-        system.modes[system.mode_index(name)] for name in (transition.source, transition.target)
-    )
-    return not (
-        transition.part_of is None and source.part_of is not None and source.part_of == target.part_of
-    )
+    source, target = map(system.mode_index, (transition.source, transition.target))
+    whole, other = system.modes[source].part_of, system.modes[target].part_of
+    return transition.part_of is not None or whole is None or whole != other
 
 
 def _clocks(system: HybridSystem) -> tuple[np.ndarray, np.ndarray]:

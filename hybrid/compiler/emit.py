@@ -22,16 +22,16 @@ from hybrid.compiler.bounds.program import programs
 from hybrid.compiler.bounds.residues import residue_of_guard, residues
 from hybrid.compiler.cases import function_of_index
 from hybrid.compiler.curvature import curvature
-from hybrid.compiler.emitted import Emitted, Propagator, Series
+from hybrid.compiler.emitted import Emitted, Propagator
 from hybrid.compiler.jacobians import slope_columns, without_zeros, zeros_first
 from hybrid.compiler.opaque import SLOPES, OpaqueFunction, check_plain
 from hybrid.compiler.parts import PARTS
+from hybrid.compiler.places import placed, places_of
 from hybrid.compiler.propagators.choice import propagator
 from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.readers import is_free, readers
 from hybrid.compiler.steep import fields_at_crossings, steep_at_guards, steep_inside
 from hybrid.compiler.surfaces import surfaces
-from hybrid.compiler.taylor.loops import padded
 from hybrid.compiler.traced import Traces, expressions_of, period_of
 from hybrid.compiler.written import Written, beyond_guards, variational
 from hybrid.errors import ModelError
@@ -45,7 +45,6 @@ from hybrid.expression.periodicity import is_periodic
 from hybrid.expression.signs import simplified
 from hybrid.expression.text import text
 from hybrid.expression.tracing import Symbols, TraceError, model_symbols
-from hybrid.kernels.types.codes import WIDE
 from hybrid.system.checks import derivative_has_time_column
 from hybrid.system.derivatives import complex_step_error
 from hybrid.system.functions import (
@@ -123,7 +122,7 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
     crossing, at_crossings = fields_at_crossings(system, fields, steep, guards, resets, boundaries, symbols)
     jacobians = [without_zeros(field.derivative, n) for field in evaluated]
     series = [each.series for each in propagators]
-    places = _places(series, with_room=system.growth is not None)
+    places = places_of(series, with_room=system.growth is not None)
     bodies: dict[str, list[Sequence[str]]] = {
         "field": [*(field.value for field in evaluated), *at_crossings],
         "field_jacobian": [*jacobians],
@@ -142,8 +141,8 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
         ],
         "reset": [reset.value for reset in resets],
         "reset_jacobian": [zeros_first(reset.derivative, n) for reset in resets],
-        "series": _placed(places, [each.statements for each in series]),
-        "tangent_series": _placed(places, [each.tangent_statements for each in series]),
+        "series": placed(places, [each.statements for each in series]),
+        "tangent_series": placed(places, [each.tangent_statements for each in series]),
     }
     surface, orientation = writer.surfaces(traced)
     pulses = [
@@ -212,44 +211,6 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
         propagators=tuple(map(_without_text, propagators)),
         tangent_start=places.vectors,
     )
-
-
-@attrs.frozen
-class _Places:
-    """The columns of the series of all modes in the matrix that they share.
-
-    Every mode has a table of its own, which stays when another mode writes its series.
-
-    Attributes
-    ----------
-    tables
-        By mode, the first column of its table; all are behind the columns of the state.
-    vectors
-        The first column of tangent vectors, behind all tables.
-    """
-
-    tables: tuple[int, ...]
-    vectors: int
-
-
-def _places(series: Sequence[Series], *, with_room: bool) -> _Places:
-    """The columns of all series; ``with_room``, further modes seldom move those of the modes before them."""
-    size = _power_of_two_from if with_room else int
-    first = size(max(each.columns for each in series))
-    tables = [*accumulate((each.table_columns for each in series), initial=first)]
-    return _Places(tuple(tables[:-1]), padded(size(tables[-1]), WIDE))
-
-
-def _power_of_two_from(count: int) -> int:
-    return 1 << (count - 1).bit_length()
-
-
-def _placed(places: _Places, statements: Sequence[Sequence[str]]) -> list[Sequence[str]]:
-    """The bodies of the series of all modes, each with its columns."""
-    return [
-        [f"table = {table}", f"vectors = {places.vectors}", *lines] if lines else []
-        for table, lines in zip(places.tables, statements, strict=True)
-    ]
 
 
 def _without_text(propagator: Propagator) -> Propagator:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 import attrs
@@ -36,6 +36,16 @@ def read(quantity: Quantity, p: Any) -> Any:
     if isinstance(quantity, str):
         return getattr(p, quantity)
     return quantity(p) if callable(quantity) else quantity
+
+
+def numbers_of(clock: Clock, x: Any, p: Any) -> tuple[Any, ...]:
+    """The numbers of a clock at a state and parameters."""
+    return clock._numbers(x, p)
+
+
+def fault_of(clock: Clock, numbers: Sequence[float]) -> str:
+    """What is wrong with the numbers of a clock, in words; empty if they are right."""
+    return clock._fault(numbers)
 
 
 def _short(quantity: Quantity) -> str:
@@ -80,15 +90,15 @@ class Clock(Portable):
         """When the clock ticks, in few words."""
         raise NotImplementedError
 
-    def numbers(self, x: Any, p: Any) -> tuple[Any, ...]:
+    def _numbers(self, x: Any, p: Any) -> tuple[Any, ...]:
         """The numbers of the clock at a state and parameters; only parameters matter here."""
         return tuple(read(quantity, p) for quantity in self.quantities)
 
-    def since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
+    def _since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
         """Time since the nearest tick, negative before it, at the clock's numbers."""
         raise NotImplementedError
 
-    def fault(self, numbers: Sequence[float]) -> str:
+    def _fault(self, numbers: Sequence[float]) -> str:
         """What is wrong with the numbers of the clock, in words; empty if they are right."""
         raise NotImplementedError
 
@@ -115,7 +125,7 @@ def _check_when(instance: Any, attribute: attrs.Attribute[Any], value: object) -
 def _check_numbers(instance: Any) -> None:
     """ModelError if numbers that do not hang on parameters are wrong."""
     if all(isinstance(quantity, float) for quantity in instance.quantities):
-        fault = instance.fault(instance.quantities)
+        fault = instance._fault(instance.quantities)
         if fault:
             raise ModelError(f"{type(instance).__name__}: {fault}.")
 
@@ -128,7 +138,7 @@ class Since:
 
     def __call__(self, t: Any, x: Any, p: Any) -> Any:
         """The time since the nearest tick, negative before it."""
-        return self.clock.since_tick(t, self.clock.numbers(x, p))
+        return self.clock._since_tick(t, self.clock._numbers(x, p))
 
 
 @attrs.frozen
@@ -181,12 +191,12 @@ class Every(Clock):
         """When the clock ticks, in few words."""
         return f"every {_short(self.period)}"
 
-    def since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
+    def _since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
         """Time since the nearest tick."""
         period, offset = numbers
         return t - offset - period * np.floor((t - offset) / period + 0.5)
 
-    def fault(self, numbers: Sequence[float]) -> str:
+    def _fault(self, numbers: Sequence[float]) -> str:
         """What is wrong with period and offset."""
         period, offset = numbers
         if not 0.0 < period < math.inf:
@@ -195,11 +205,9 @@ class Every(Clock):
 
 
 def _as_times(value: Any) -> tuple[Quantity, ...]:
-    if isinstance(value, str) or callable(value):
-        value = (value,)
-    if not isinstance(value, Iterable):
-        raise ModelError(f"At: times must be a list of times; got {shown(value)}.")
-    found = tuple(_as_quantity("At", f"times[{i}]", each) for i, each in enumerate(value))
+    given = (value,) if isinstance(value, str) or callable(value) else value
+    each_time = arguments.items("At: times", given, "be a list of times")
+    found = tuple(_as_quantity("At", f"times[{i}]", each) for i, each in enumerate(each_time))
     if not found:
         raise ModelError("At: times must hold at least one time; got none.")
     return found
@@ -253,14 +261,14 @@ class At(Clock):
         """When the clock ticks, in few words."""
         return f"at {_short(self.times[0])}" if len(self.times) == 1 else f"at {len(self.times)} times"
 
-    def since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
+    def _since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
         """Time since the nearest time; since the first one if no parameter moves any."""
         nearest = numbers[0]
         for each in numbers[1:] if not all(isinstance(given, float) for given in self.times) else ():
             nearest = np.where(np.abs(t - each) < np.abs(t - nearest), each, nearest)
         return t - nearest
 
-    def fault(self, numbers: Sequence[float]) -> str:
+    def _fault(self, numbers: Sequence[float]) -> str:
         """What is wrong with the times."""
         before = -math.inf
         for i, after in enumerate(numbers):
@@ -319,11 +327,11 @@ class After(Clock):
         """When the clock ticks, in few words."""
         return f"after {_short(self.duration)}"
 
-    def since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
+    def _since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
         """Time since the tick of a mode that was entered at time 0."""
         return t - numbers[0]
 
-    def fault(self, numbers: Sequence[float]) -> str:
+    def _fault(self, numbers: Sequence[float]) -> str:
         """What is wrong with the duration."""
         [duration] = numbers
         return (
@@ -360,14 +368,14 @@ class DerivedClock(Clock):
         """When the clock ticks, in few words."""
         return self.clock.told
 
-    def numbers(self, x: Any, p: Any) -> tuple[Any, ...]:
+    def _numbers(self, x: Any, p: Any) -> tuple[Any, ...]:
         """The numbers of the clock at a state and parameters."""
         return tuple(self.read(x, p))
 
-    def since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
+    def _since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
         """Time since the nearest tick."""
-        return self.clock.since_tick(t, numbers)
+        return self.clock._since_tick(t, numbers)
 
-    def fault(self, numbers: Sequence[float]) -> str:
+    def _fault(self, numbers: Sequence[float]) -> str:
         """What is wrong with the numbers, in words."""
-        return self.clock.fault(numbers)
+        return self.clock._fault(numbers)

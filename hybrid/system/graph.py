@@ -16,7 +16,7 @@ from hybrid import arguments
 from hybrid.display.tables import html_table, table, with_unit
 from hybrid.errors import ArgumentError, ModelError, unknown_name
 from hybrid.system.checks import check_angles, check_functions
-from hybrid.system.clocks import Clock
+from hybrid.system.clocks import Clock, fault_of, numbers_of
 from hybrid.system.elements import END, Guard, Mode, Transition
 from hybrid.system.functions import ModelFunction, functions_in
 from hybrid.system.growth import Growth, grows
@@ -308,8 +308,8 @@ class HybridSystem(Portable):
         for transition in self.transitions:
             clock = transition.clock
             if clock is not None:
-                numbers = tuple(map(float, clock.numbers(view, p)))
-                fault = clock.fault(numbers)
+                numbers = tuple(map(float, numbers_of(clock, view, p)))
+                fault = fault_of(clock, numbers)
                 if fault:
                     owner = f"Transition {transition.name!r}: {type(clock).__name__}"
                     raise ArgumentError(f"{owner}: {fault} with these parameters.")

@@ -10,7 +10,7 @@ import attrs
 
 from hybrid.compiler.compiled import compile_system
 from hybrid.solvers import Solver
-from hybrid.system.clocks import Clock, DerivedClock
+from hybrid.system.clocks import Clock, DerivedClock, numbers_of
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem
@@ -158,7 +158,7 @@ def _measured(system: HybridSystem) -> Measured:
 
     def slower(clock: Clock) -> Callable[..., Any]:
         def numbers(x: Any, p: Any) -> list[Any]:
-            own = clock.numbers(x, named_values(PARAMETERS, names, p[: len(names)]))
+            own = numbers_of(clock, x, named_values(PARAMETERS, names, p[: len(names)]))
             return [getattr(p, time) * number for number in own]
 
         return numbers

@@ -10,7 +10,7 @@ import attrs
 
 from hybrid.expression.reads import names_read
 from hybrid.expression.values import TraceError
-from hybrid.system.clocks import Clock, DerivedClock
+from hybrid.system.clocks import Clock, DerivedClock, numbers_of
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem
@@ -72,8 +72,11 @@ class _Extension:
         when = None if guard.when is None else self._function(guard.when)
         moved: Guard | Clock
         if isinstance(guard, Clock):
-            numbers = guard.numbers
-            moved = DerivedClock(guard, lambda x, p: numbers(x, self._all_parameters(x, p)), when)
+
+            def numbers(x: Any, p: Any, clock: Clock = guard) -> tuple[Any, ...]:
+                return numbers_of(clock, x, self._all_parameters(x, p))
+
+            moved = DerivedClock(guard, numbers, when)
         else:
             moved = Guard(self._function(guard.function), guard.direction, when=when, at_start=guard.at_start)
         return attrs.evolve(transition, guard=moved, reset=new)
