@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from typing import Any
 
 import attrs
@@ -20,6 +20,7 @@ from hybrid.simulation.memory import MOST_LAYOUTS, Memory, no_record, run_layout
 from hybrid.solvers import Solver, Taylor
 from hybrid.solvers.tableau import SERIES_NODES, SERIES_WEIGHTS
 from hybrid.status import StatusCode
+from hybrid.system.graph import ticks_of
 
 DEFAULT_SOLVER = Taylor()
 
@@ -135,7 +136,7 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: i
             dense_degree(compiled, method, kinds),
             run_layout(n, tangents, modes, transitions, system.first_tick[-1]),
             work_layout(method, n, tangents, columns, rows),
-            system.ticks if system.first_tick[-1] else None,
+            partial(ticks_of, system) if system.first_tick[-1] else None,
         )
         while len(compiled.plans) >= MOST_LAYOUTS:
             compiled.plans.pop(next(iter(compiled.plans)), None)

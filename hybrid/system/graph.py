@@ -301,21 +301,6 @@ class HybridSystem(Portable):
         counts = (0 if each.clock is None else len(each.clock.quantities) for each in self.transitions)
         return tuple(accumulate(counts, initial=0))
 
-    def ticks(self, x: np.ndarray, parameters: np.ndarray) -> list[float]:
-        """The numbers of all clocks at a state and parameters; ArgumentError if one cannot be."""
-        view, p = self.variables.state_view(x), self.variables.parameter_view(parameters.tolist())
-        found: list[float] = []
-        for transition in self.transitions:
-            clock = transition.clock
-            if clock is not None:
-                numbers = tuple(map(float, numbers_of(clock, view, p)))
-                fault = fault_of(clock, numbers)
-                if fault:
-                    owner = f"Transition {transition.name!r}: {type(clock).__name__}"
-                    raise ArgumentError(f"{owner}: {fault} with these parameters.")
-                found += numbers
-        return found
-
     @cached_property
     def graph(self) -> nx.MultiDiGraph:
         """The modes and transitions as a networkx graph, to inspect, check or draw.
@@ -436,6 +421,22 @@ def _guard_told(guard: Guard | Clock) -> str:
     if isinstance(guard, Clock):
         return guard.told
     return GUARD_SIDES[guard.direction] + (", at the start" if guard.at_start else "")
+
+
+def ticks_of(system: HybridSystem, x: np.ndarray, parameters: np.ndarray) -> list[float]:
+    """The numbers of all clocks at a state and parameters; ArgumentError if one cannot be."""
+    view, p = system.variables.state_view(x), system.variables.parameter_view(parameters.tolist())
+    found: list[float] = []
+    for transition in system.transitions:
+        clock = transition.clock
+        if clock is not None:
+            numbers = tuple(map(float, numbers_of(clock, view, p)))
+            fault = fault_of(clock, numbers)
+            if fault:
+                owner = f"Transition {transition.name!r}: {type(clock).__name__}"
+                raise ArgumentError(f"{owner}: {fault} with these parameters.")
+            found += numbers
+    return found
 
 
 def check_mode(system: HybridSystem, name: object, what: str = "Mode") -> None:
