@@ -81,8 +81,9 @@ class Model(Structure):
     ``clock_of``. ``whole_mode`` is the mode that one is a part of, and ``enters`` 1 for a transition that
     enters its target anew. ``accumulates_to`` is the mode after a complete chatter, or -1. ``propagator``
     says how each mode is advanced; ``degree`` is that of its solutions in time where they are polynomials,
-    else 0. ``fragile`` is 1 for a mode whose series may be undefined where its field is not, ``abrupt`` for one whose field may
-    change abruptly, ``bounded`` for one whose forcing can be bounded, so that no pulse in it is stepped over.
+    else 0. ``fragile`` is 1 for a mode whose series may be undefined where its field is not, ``abrupt`` for
+    one whose field may change abruptly, ``bounded`` for one whose forcing can be bounded, so that no pulse in
+    it is stepped over.
     ``first_forcing[m]`` is the first forcing of mode ``m``, whose program is behind those of
     all transitions; ``forcing_component`` is the component of the state whose rate a forcing is a term of, or
     -1; ``forcing_kind`` is one of those in ``codes``. Residues are rates that may cancel to their rounding:
