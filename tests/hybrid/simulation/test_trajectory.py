@@ -1,12 +1,9 @@
 """Time as whole periods and a phase, and a run that goes on from another."""
 
 import math
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
-from hybrid.simulation import trajectory
 from hybrid.simulation.periods import split_time
 
 PERIODS = [0.1, 1.0 / 3.0, 2 * math.pi / 7.46, 1e-9, 3e5]
@@ -41,19 +38,3 @@ def test_the_phase_is_never_a_whole_period():
 
 def test_without_a_period_all_of_the_time_is_phase():
     assert split_time(-7.5, 0.0) == (0, -7.5)
-
-
-def test_a_run_with_markers_goes_on_from_one_without():
-    """The sides of its markers, which come first, stay; the others are taken, and nothing is due."""
-    run = SimpleNamespace(
-        cycle=0, phase=0.0, phase_low=0.0, mode=1, previous_mode=0, due=np.ones(3, dtype=int),
-        side=np.array([7, 7, 7]), on_guard=np.array([5, 5, 5]),
-    )  # fmt: skip
-    before = SimpleNamespace(
-        cycle=4, phase=0.5, phase_low=1e-20, side=np.array([1, -1]), on_guard=np.array([0, 1])
-    )
-    trajectory.Trajectory.goes_on_from(SimpleNamespace(run=run), SimpleNamespace(run=before))
-    assert (run.cycle, run.phase, run.phase_low, run.previous_mode) == (4, 0.5, 1e-20, 1)
-    assert run.side.tolist() == [7, 1, -1]
-    assert run.on_guard.tolist() == [5, 0, 1]
-    assert run.due.tolist() == [0, 0, 0]

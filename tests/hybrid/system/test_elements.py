@@ -58,7 +58,7 @@ def test_a_guard_of_the_start_has_a_side(direction):
         (lambda: Transition("a", "", GUARD), "Transition: target must be a non-empty string; got ''"),
         (lambda: Transition("a", "b", GUARD, name=""), "Transition: name must be a non-empty string"),
         (lambda: Transition("a", "b", GUARD, part_of=1), "Transition: part_of must be a non-empty string"),
-        (lambda: Transition("a", "b", zero), "Transition: guard must be a Guard; got"),
+        (lambda: Transition("a", "b", zero), "Transition: guard must be a Guard or a clock; got"),
         (lambda: Transition("a", "b", GUARD, zero), "Transition: reset must be a Reset or None"),
     ],
 )

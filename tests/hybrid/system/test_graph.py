@@ -26,7 +26,10 @@ CONSTRUCTION = [
     (lambda: Mode("", fall), "Mode: name must be a non-empty string; got ''."),
     (lambda: Mode("flight", 1.0), "Mode: field must be a function of (t, x, p); got 1.0."),
     (lambda: Mode("flight", fall, jacobian=2), "Mode: jacobian must be a function of (t, x, p); got 2."),
-    (lambda: Transition("a", "b", height), "Transition: guard must be a Guard; got <function height"),
+    (
+        lambda: Transition("a", "b", height),
+        "Transition: guard must be a Guard or a clock; got <function height",
+    ),
     (
         lambda: Transition("a", "b", Guard(height), rebound),
         "reset must be a Reset or None (identity); got <function",
