@@ -120,13 +120,13 @@ def disagreement(
     text = _difference(system, function.title, function.value, found, t, x, values, opaque)
     if text is not None or function.kind == CONDITION:
         return text
-    if function.derivative is not None:
+    if function.slopes is not None:
         found = compiled.derivative(function, index, t, x, values)
-        given = evaluate(system.variables, function.derivative, t, x, values)
+        given = evaluate(system.variables, function.slopes, t, x, values)
         width = found.shape[1] if given is None else len(given) // function.rows
         given_columns = found[:, :width].ravel()
         title = function.derivative_title
-        return _difference(system, title, function.derivative, given_columns, t, x, values, opaque)
+        return _difference(system, title, function.slopes, given_columns, t, x, values, opaque)
     if not opaque:
         return None
     try:
@@ -138,6 +138,8 @@ def disagreement(
     value_size = np.where(np.isfinite(found), np.abs(found), 0.0) / (np.abs(x).max() or 1.0)
     size = np.where(known, np.abs(wanted), 0.0).max(axis=1) + value_size
     found = compiled.derivative(function, index, t, x, values)
+    # Behind these are the rows of held components and of counters.
+    known[function.kept :] = False
     wrong = known & ~(np.abs(found - wanted) <= SAME_DERIVATIVE * size[:, None])
     if not np.any(wrong):
         return None
@@ -248,7 +250,13 @@ def _shaken_operations(
     """Values ``(SHAKES, rows)`` of a function, each time with other roundings of its operations."""
     symbols = [_shake(np.broadcast_to(each, (SHAKES, *np.shape(each))), rng).T for each in (t, x, values)]
     with np.errstate(all="ignore"):
-        found = values_of(function, system.state, tuple(system.parameters), _Shaken(rng), tuple(symbols))
+        found = values_of(
+            function,
+            system.variables.components,
+            tuple(system.parameters),
+            _Shaken(rng),
+            tuple(symbols),
+        )
     return np.array([np.broadcast_to(each, SHAKES) for each in found], dtype=float).T
 
 

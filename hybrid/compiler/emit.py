@@ -10,7 +10,7 @@ tangent vectors. It writes their derivatives and, one place further, the diverge
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -84,7 +84,7 @@ def emit(system: HybridSystem, traces: Traces | None = None) -> Emitted:
 
 def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
     writer = _Writer(system, traces)
-    fields = [writer.write(field_function(mode, system.dimension)) for mode in system.modes]
+    fields = [writer.write(field_function(mode, system.variables)) for mode in system.modes]
     guards = [writer.write(guard_function(transition)) for transition in system.transitions]
     conditions = [_written_condition(writer, transition) for transition in system.transitions]
     resets = [_written_reset(writer, system, i) for i in range(len(system.transitions))]
@@ -247,7 +247,9 @@ class _Writer:
         targets = ["out[0]"] if function.size is None else [f"out[{i}]" for i in range(function.size)]
         try:
             expressions = self.traced(function)
-            jacobian = jacobian_of(expressions, self.symbols.variables)
+            jacobian = jacobian_of(expressions[: function.kept], self.symbols.variables)
+            memory = function.memory_rows(self.system.dimension + 1)
+            jacobian += [[ONE if entry else ZERO for entry in row] for row in memory]
             _check_printable(entry for row in jacobian for entry in row if entry is not ZERO)
         except ModelError as error:
             return self._write_opaque(function, targets, error)
@@ -306,15 +308,16 @@ class _Writer:
 
     def _opaque_value(self, function: ModelFunction, targets: Sequence[str], reason: ModelError) -> list[str]:
         name = self._opaque_name(function, reason)
-        return [f"r = {name}(t, x, p)", *(f"{target} = r[{i}]" for i, target in enumerate(targets))]
+        values = [f"r[{i}]" if i < function.returned else "0.0" for i in range(len(targets))]
+        return [f"r = {name}(t, x, p)", *map(" = ".join, zip(targets, values, strict=True))]
 
     def _complex_step(self, function: ModelFunction, reason: ModelError) -> list[str]:
         name, columns = self._opaque_name(function, reason), self.system.dimension + 1
         self.opaque[name] = attrs.evolve(self.opaque[name], slopes=True)
         lines = [f"r{j} = {name}{SLOPES}(t, x, p, {j})" for j in range(columns)]
         cells = iter(self._cells(function))
-        lines += [f"{next(cells)} = r{j}[{i}]" for i in range(function.rows) for j in range(columns)]
-        return lines
+        lines += [f"{next(cells)} = r{j}[{i}]" for i in range(function.kept) for j in range(columns)]
+        return lines + self._memory_cells(function, cells)
 
     def _given_derivative(self, function: ModelFunction) -> list[str]:
         n, cells = self.system.dimension, self._cells(function)
@@ -333,10 +336,15 @@ class _Writer:
         name = self._opaque_name(function, reason, width)
         cells = iter(self._cells(function))
         lines = [f"r = {name}(t, x, p)"]
-        for i in range(function.rows):
+        for i in range(function.kept):
             entries = [*(f"r[{i * width + j}]" for j in range(width)), *["0.0"] * (n + 1 - width)]
             lines += [f"{next(cells)} = {entry}" for entry in entries]
-        return lines
+        return lines + self._memory_cells(function, cells)
+
+    def _memory_cells(self, function: ModelFunction, cells: Iterator[str]) -> list[str]:
+        """Statements for the rows of a derivative that are not those of the user's function."""
+        rows = function.memory_rows(self.system.dimension + 1)
+        return [f"{next(cells)} = {entry}" for row in rows for entry in row]
 
     def _cells(self, function: ModelFunction) -> list[str]:
         columns = range(self.system.dimension + 1)
@@ -347,7 +355,7 @@ class _Writer:
     def _opaque_name(self, function: ModelFunction, reason: ModelError, width: int | None = None) -> str:
         """Name of a function that stays opaque; with ``width``, of its derivative of so many columns."""
         title, called = function.title, function.function
-        shape = () if function.size is None else (function.size,)
+        shape = () if function.size is None else (function.returned,)
         completed = function.completed is not None
         if width is not None and function.derivative is not None:
             title, called = function.derivative_title, function.derivative
@@ -357,7 +365,7 @@ class _Writer:
                 return name
         check_plain(title, called)
         name, names, why = f"model_{len(self.opaque)}", tuple(self.system.parameters), str(reason).rstrip(".")
-        opaque = OpaqueFunction(title, called, why, self.system.state, names, shape, completed=completed)
+        opaque = OpaqueFunction(title, called, why, self.system.variables.components, names, shape, completed=completed)
         self.opaque[name] = opaque
         return name
 
@@ -369,7 +377,7 @@ def _check_printable(expressions: Iterable[Expression]) -> None:
 
 
 def _written_reset(writer: _Writer, system: HybridSystem, index: int) -> Written:
-    function = reset_function(system.transitions[index], system.state)
+    function = reset_function(system.transitions[index], system.variables)
     return writer.identity() if function is None else writer.write(function)
 
 
@@ -401,7 +409,7 @@ def _where_it_jumps(
 ) -> str:
     """Where the field of a mode jumps in the state, in words; empty if it is proved to jump nowhere."""
     if field.expressions is None:
-        function = field_function(system.modes[index], system.dimension)
+        function = field_function(system.modes[index], system.variables)
         differentiable = function.derivative is None or complex_step_error(system.variables, function) is None
         return "it branches" if may_jump(function.value, differentiable) else ""
     known = known_positive(boundaries)

@@ -32,7 +32,7 @@ def expressions_of(
     ModelError
         If it cannot be traced.
     """
-    called = function.derivative if derivative else function.value
+    called = function.slopes if derivative else function.value
     assert called is not None
     return _remembered(("trace", derivative, *function.identity), called, system, traces)
 
@@ -43,7 +43,7 @@ def _remembered(
     if key not in traces:
         try:
             # The function is kept: the key holds its identity.
-            traces[key] = trace(called, system.state, tuple(system.parameters)), called
+            traces[key] = trace(called, system.variables.components, tuple(system.parameters)), called
         except ModelError as reason:
             traces[key] = reason, called
     found, _ = traces[key]
@@ -95,7 +95,7 @@ def key_of(system: HybridSystem, traces: Traces) -> str | None:
         ]
         for transition in system.transitions
     ]
-    names = [system.state, [*system.parameters], [*system.mode_names]]
+    names = [system.state, system.held, system.counters, [*system.parameters], [*system.mode_names]]
     timed = system.period is not None, period is not None
     listed = _listed([*expressions, *([] if period is None else [period])])
     return json.dumps([names, graph, functions, timed, listed])

@@ -39,5 +39,7 @@ def names_read(system: HybridSystem, function: Callable[..., Any]) -> frozenset[
     variables = system.variables
     x = tuple(frozenset((name,)) for name in variables.state_names)
     p = tuple(frozenset((name,)) for name in variables.parameter_names)
-    found = values_of(function, system.state, variables.parameter_names, _Names(), (frozenset((TIME,)), x, p))
+    found = values_of(
+        function, variables.components, variables.parameter_names, _Names(), (frozenset((TIME,)), x, p)
+    )
     return frozenset().union(*found)

@@ -91,7 +91,7 @@ class HybridArc:
     system, parameters
         The model, and the values of all its parameters in the run, by name.
     t, j, x
-        Times ``(N,)``, jump counts ``(N,)``, states ``(N, n)``.
+        Times ``(N,)``, jump counts ``(N,)``, states ``(N, n)`` with held components and counters last.
     jump_count
         Number of jumps, also of those that were not kept.
     grazings
@@ -99,8 +99,8 @@ class HybridArc:
     status
         How the run ended. A run that ended early keeps its results up to there.
     fundamental
-        ``(n, k)`` tangent vectors at the end, carried by the variational equation and the saltation matrices;
-        None if the run had none.
+        ``(n, k)`` tangent vectors at the end, carried by the variational equation and the saltation matrices,
+        without rows for counters; None if the run had none.
     propagators
         How each mode was advanced, by its name: ``"exact"``, ``"Taylor series"``, ``"Taylor series,
         desingularised"``, ``"Taylor series, with the root of a guard"`` or ``"Runge-Kutta pair"``. If
@@ -177,12 +177,12 @@ class HybridArc:
     @property
     def sampled_sensitivity(self) -> np.ndarray:
         """Derivatives ``(N, n, m)`` of the samples in the parameters; as ``sensitivity``."""
-        return self._sampled()[:, :, self.system.dimension :]
+        return self._sampled()[:, :, self.system.tangent_dimension :]
 
     @property
     def sampled_fundamental(self) -> np.ndarray:
         """Derivatives ``(N, n, n)`` of the samples in the start; as ``sensitivity``."""
-        return self._sampled()[:, :, : self.system.dimension]
+        return self._sampled()[:, :, : self.system.tangent_dimension]
 
     def _sampled(self) -> np.ndarray:
         found = known(self._sensitivities)
@@ -221,7 +221,10 @@ class HybridArc:
             "mode": ("t", self.mode),
         }
         if self.fundamental is not None:
-            variables["fundamental"] = (("state", "tangent"), self.fundamental)
+            # Counters have no derivatives.
+            rows = np.full((self.system.dimension, self.fundamental.shape[1]), np.nan)
+            rows[: len(self.fundamental)] = self.fundamental
+            variables["fundamental"] = (("state", "tangent"), rows)
         coords = {"t": ("t", self.t, names.of("t")), **names.coords()}
         made_by = attributes("arc", self.status, self.system, self.parameters)
         return xarray.Dataset(variables, coords, made_by)

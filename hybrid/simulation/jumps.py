@@ -74,6 +74,8 @@ class Jump:
     def saltation(self) -> np.ndarray:
         """Saltation matrix ``(n, n)``: what the jump does to tangent vectors, to first order.
 
+        Counters have no rows and columns in it.
+
         If a jump triggers others at the same instant, by landing beyond their guards, all of them happen at
         the time of its own guard. The product of the matrices is the tangent map of all these jumps, provided
         that the matrices before the last one can be inverted.
@@ -187,12 +189,12 @@ class Jumps(Sequence[Jump]):
         ArgumentError
             If the run had no ``sensitivities``.
         """
-        return known(self._sensitivities).times[:, self._states.shape[2] :]
+        return known(self._sensitivities).times[:, self.system.tangent_dimension :]
 
     @property
     def t_gradient(self) -> np.ndarray:
         """Derivatives ``(jumps, n)`` of the times in the start; as ``t_sensitivity``."""
-        return known(self._sensitivities).times[:, : self._states.shape[2]]
+        return known(self._sensitivities).times[:, : self.system.tangent_dimension]
 
     @cached_property
     def t(self) -> np.ndarray:
@@ -227,14 +229,15 @@ class Jumps(Sequence[Jump]):
     @cached_property
     def saltation(self) -> np.ndarray:
         """As in :class:`Jump`, ``(jumps, n, n)``; those that the run did not need are made when looked at."""
-        missing = np.flatnonzero(self._has_matrix == 0)
+        missing, k = np.flatnonzero(self._has_matrix == 0), self.system.tangent_dimension
+        recorded = self._recorded[:, :k, :k]
         if not missing.size:
-            return self._recorded
+            return recorded
         fired, phases = self.transition_index[missing].tolist(), self._phase[missing].tolist()
         parameters = dict(zip(self.system.parameters, self._parameters.tolist(), strict=True))
         model = compile_system(self.system).model(parameters)
-        matrices = np.empty((len(self), *self._recorded.shape[1:]))
-        matrices[self._has_matrix == 1] = self._recorded
+        matrices = np.empty((len(self), k, k))
+        matrices[self._has_matrix == 1] = recorded
         matrices[missing], _ = matrices_at(
             self.system, model, fired, phases, np.ascontiguousarray(self.x_minus[missing])
         )

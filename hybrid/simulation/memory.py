@@ -79,7 +79,7 @@ class Memory:
         y = run.y
         y[:n] = state
         if tangent is not None:
-            y[n:] = tangent.T.ravel()
+            put_tangents(y, n, tangent)
         np.abs(state, out=run.scale)
         return float(run.phase)
 
@@ -104,6 +104,12 @@ class Memory:
 
     def _task(self, model: Any, orthonormal: bool) -> Any:
         return self.plan.task.replace(run=self.run, work=self.work, model=model, orthonormal=int(orthonormal))
+
+
+def put_tangents(y: np.ndarray, n: int, matrix: np.ndarray) -> None:
+    """Write tangent vectors, columns, behind the state ``(n,)``; their components for counters are zero."""
+    rows = y[n:].reshape(-1, n)
+    rows[:, : len(matrix)], rows[:, len(matrix) :] = matrix.T, 0.0
 
 
 def starts_of(memory: Memory, origins: np.ndarray, **others: Any) -> Any:

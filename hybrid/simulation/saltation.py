@@ -47,7 +47,7 @@ def saltation_matrix(
     Returns
     -------
     numpy.ndarray
-        ``(n, n)``.
+        ``(n, n)``, without rows and columns for counters.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def saltation_matrix(
 def matrices_at(
     system: HybridSystem, model: Any, transitions: list[int], phases: list[float], states: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Saltation matrices ``(J, n, n)`` and transversalities ``(J,)`` of transitions at states ``(J, n)``."""
+    """Saltation matrices ``(J, k, k)`` and transversalities ``(J,)`` of transitions at states ``(J, n)``."""
     n = system.dimension
     matrices, transversalities = np.empty((len(states), n, n)), np.empty(len(states))
     kernel = load_kernels("hybrid.kernels.jumps.jump").saltation
@@ -98,4 +98,5 @@ def matrices_at(
     for i, (fired, phase, state) in enumerate(zip(transitions, phases, states, strict=True)):
         transversalities[i] = kernel(model, fired, phase, state, x_plus, work)
         matrices[i] = work.saltation
-    return matrices, transversalities
+    k = system.tangent_dimension
+    return matrices[:, :k, :k], transversalities

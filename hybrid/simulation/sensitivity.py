@@ -15,7 +15,7 @@ from hybrid.simulation.trajectory import start
 from hybrid.solvers import Solver
 from hybrid.status import apart_status
 from hybrid.system.functions import guard_function
-from hybrid.transform.extended import extended
+from hybrid.transform.extended import extended, with_parameters
 from hybrid.transform.restricted import restricted
 
 
@@ -63,7 +63,7 @@ class Sensitivities:
     def times(self) -> np.ndarray:
         """Derivatives ``(jumps, n + m)`` of the times of jumps; nan for the limit of a chatter."""
         jumps = self.arc.jumps if self.jumps is None else self.jumps
-        found = np.full((len(jumps), len(self.x0)), np.nan)
+        found = np.full((len(jumps), self.arc.system.tangent_dimension), np.nan)
         before = np.append(self.t0, jumps.t[:-1])
         # A jump that another sets off happens at the time of that one.
         first = np.flatnonzero((jumps.t > before) & (jumps.kind != "limit"))
@@ -84,7 +84,7 @@ class Sensitivities:
             mode=self.mode,
             parameters=self.arc.parameters,
             solver=self.solver,
-            tangent=np.eye(len(self.x0)),
+            tangent=np.eye(self.arc.system.tangent_dimension),
         )
         found = []
         for t in times:
@@ -102,8 +102,9 @@ class Sensitivities:
         index = system.transition_index(jump.transition)
         function = guard_function(system.transitions[index])
         values = system.parameter_values(self.arc.parameters)
-        place = np.append(jump.x_minus[: self.dimension], self.x0[self.dimension :])
-        slope = compile_system(system).derivative(function, index, jump.t, place, values)[0, :-1]
+        last = self.dimension + len(self.names)
+        place = with_parameters(system, jump.x_minus, self.x0[self.dimension : last])
+        slope = compile_system(system).derivative(function, index, jump.t, place, values)[0, :last]
         assert run.fundamental is not None
         return -(slope @ run.fundamental) / jump.transversality
 
@@ -125,8 +126,8 @@ def with_sensitivities(
     If that run has other jumps, both are right within the tolerances, and the status says so.
     """
     system = extended(arc.system, names)
-    n, m = arc.system.dimension, len(names)
-    begin = np.concatenate([x0, [arc.parameters[name] for name in names]])
+    n, m = arc.system.tangent_dimension, len(names)
+    begin = with_parameters(system, x0, np.array([arc.parameters[name] for name in names]))
     parameters = {name: value for name, value in arc.parameters.items() if name not in names}
     again = simulate(
         system,

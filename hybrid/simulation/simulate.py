@@ -53,7 +53,8 @@ def simulate(
         The model.
     x0
         State ``(n,)`` at the start, in order or by name: ``{"q": 1.0, "v": 0.0}``. A Series of pandas or a
-        DataArray of xarray that is labelled with the names is read by these, in any order.
+        DataArray of xarray that is labelled with the names is read by these, in any order. Held components
+        and counters come last and may be left out: they are 0 then.
     t_span
         ``(t0, t1)`` with ``t0 <= t1``. Events at ``t1`` belong to the run.
     mode
@@ -65,8 +66,8 @@ def simulate(
     solver
         Method and tolerances, by default ``Taylor(rtol=1e-10, atol=1e-12)``: what fits each mode.
     tangent
-        True for the fundamental matrix, or an ``(n, k)`` matrix of tangent vectors to carry; their error is
-        controlled with the state's.
+        True for the fundamental matrix, or an ``(n, k)`` matrix of tangent vectors to carry, with a row for
+        every component but the counters; their error is controlled with the state's.
     samples
         Increasing times at which to store the state; only these states are then stored, so the memory of a
         run does not grow with its length.
@@ -145,7 +146,7 @@ def _parameter_names(system: HybridSystem, given: Any) -> tuple[str, ...]:
 
 
 def _tangent_matrix(tangent: Any, system: HybridSystem) -> np.ndarray:
-    n = system.dimension
+    n = system.tangent_dimension
     if tangent is True:
         return np.eye(n)
     wanted = f"be True or a finite matrix of shape ({n}, k), one tangent vector per column"

@@ -16,7 +16,7 @@ from hybrid.kernels.types import codes
 from hybrid.kernels.types.codes import UNLIMITED
 from hybrid.simulation.initial_mode import choose_mode
 from hybrid.simulation.interrupt import CTRL_C, FIRST_BURST, Bursts, Stop
-from hybrid.simulation.memory import Memory
+from hybrid.simulation.memory import Memory, put_tangents
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import Plan, check_solver, plan_of
 from hybrid.solvers import Solver
@@ -186,13 +186,13 @@ class Trajectory:
 
     @property
     def tangent_matrix(self) -> np.ndarray:
-        """Tangent vectors as columns ``(n, k)``, a copy."""
+        """Tangent vectors as columns ``(n, k)``, a copy; counters have no rows."""
         n = self.model.dimension
-        return self.run.y[n:].reshape(self.tangents, n).T.copy()
+        return self.run.y[n:].reshape(self.tangents, n)[:, : self.system.tangent_dimension].T.copy()
 
     def replace_tangents(self, matrix: np.ndarray) -> None:
         """Go on with other tangent vectors, the columns of ``(n, k)``."""
-        self.run.y[self.model.dimension :] = matrix.T.ravel()
+        put_tangents(self.run.y, self.model.dimension, matrix)
         if self.run.stage == codes.READY:
             self.run.stage = codes.STALE
 

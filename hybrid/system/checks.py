@@ -23,6 +23,10 @@ SAMPLE_TIME = np.float64(0.7548776662466927)
 SAMPLE_STRIDE = 0.6180339887498949
 
 
+# Size of counters at the sample points, whose components are near 1.
+COUNTS = 3
+
+
 def check_functions(variables: Variables, functions: Sequence[ModelFunction], period: Period) -> None:
     """Call every model function at a few generic points and check the returned values.
 
@@ -89,7 +93,7 @@ def derivative_has_time_column(variables: Variables, function: ModelFunction) ->
     value = _call(function.derivative_title, function.derivative, _arguments(variables))
     if value is None:
         return False
-    return int(np.asarray(value[0]).size) == function.rows * (variables.dimension + 1)
+    return int(np.asarray(value[0]).size) == function.returned * (variables.dimension + 1)
 
 
 def _arguments(variables: Variables) -> tuple[Any, ...]:
@@ -99,10 +103,11 @@ def _arguments(variables: Variables) -> tuple[Any, ...]:
 
 def _check_function(variables: Variables, function: ModelFunction) -> None:
     arguments = _arguments(variables)
-    value = _call(function.title, function.value, arguments)
+    value = _call(function.title, function.function if function.still else function.value, arguments)
     if value is not None:
         _check_value(variables, function, value[0])
         _check_pure(variables, function)
+        _check_counters(variables, function)
     else:
         _check_division(variables, function)
     if function.derivative is not None:
@@ -120,6 +125,21 @@ def _check_pure(variables: Variables, function: ModelFunction) -> None:
                 f"(t = {t:.6g}, x = {x.tolist()}), {second.tolist()}. A model function must be pure: no "
                 "random numbers, no counters, no memory of earlier calls."
             )
+
+
+def _check_counters(variables: Variables, function: ModelFunction) -> None:
+    """Check that a reset makes whole numbers of counters that are whole numbers."""
+    first = variables.tangent_dimension
+    for t, x in sample_points(variables.dimension) if function.counted else ():
+        x[first:] = np.round(COUNTS * x[first:])
+        values = evaluate(variables, function.value, t, x, variables.defaults)
+        for name, value in zip(variables.counters, () if values is None else values[first:], strict=False):
+            if not value.is_integer():
+                raise ModelError(
+                    f"{function.title} gives counter {name!r} the value {value:.6g} "
+                    f"{variables.described(t, x, variables.defaults)}. Counters are whole numbers; a number "
+                    "of another kind that resets change is a held component."
+                )
 
 
 def _check_division(variables: Variables, function: ModelFunction) -> None:
@@ -224,28 +244,31 @@ def _check_value(variables: Variables, function: ModelFunction, value: Any) -> N
                 f"{function.title} must return one number that changes sign; got {arguments.shown(value)}."
             )
         return
-    values = _as_sequence(function.title, value, f"one value per state ({_names(variables)})")
-    if len(values) != function.size:
+    names = ", ".join(variables.state_names[: function.returned])
+    values = _as_sequence(function.title, value, f"one value per state ({names})")
+    if len(values) != function.returned:
         what = "time derivative" if function.kind == "field" else "value"
+        others = ", ".join(variables.state_names[function.returned :])
         raise ModelError(
-            f"{function.title} returned {len(values)} values; the state has {function.size} "
-            f"({_names(variables)}). Return one {what} per state."
+            f"{function.title} returned {len(values)} values; the state has {function.returned} "
+            f"({names}). Return one {what} per state."
+            + (f" What is held or counts has no field: {others}." if others else "")
         )
     _check_numbers(function.title, values)
 
 
 def _check_derivative_shape(variables: Variables, function: ModelFunction, value: Any) -> None:
-    n, title = variables.dimension, function.derivative_title
+    n, m, title = variables.dimension, function.returned, function.derivative_title
     if function.size is None:
         rows = [_as_sequence(title, value, f"{n} or {n + 1} values")]
     else:
         rows = [
             _as_sequence(title, row, f"rows of {n} or {n + 1} values")
-            for row in _as_sequence(title, value, f"{n} rows")
+            for row in _as_sequence(title, value, f"{m} rows")
         ]
     widths = sorted({len(row) for row in rows})
-    if len(rows) != function.rows or len(widths) != 1 or widths[0] not in (n, n + 1):
-        wanted = f"{n} or {n + 1} values" if function.size is None else f"{n} rows of {n} or {n + 1} values"
+    if len(rows) != m or len(widths) != 1 or widths[0] not in (n, n + 1):
+        wanted = f"{n} or {n + 1} values" if function.size is None else f"{m} rows of {n} or {n + 1} values"
         shape = " or ".join(map(str, widths))
         got = f"{shape} values" if function.size is None else f"{len(rows)} rows of {shape} values"
         raise ModelError(

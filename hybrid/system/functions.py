@@ -10,7 +10,7 @@ import attrs
 from hybrid.errors import ModelError, unknown_name
 from hybrid.system.elements import Mode, Transition
 from hybrid.system.labels import plain_name
-from hybrid.system.variables import STATE
+from hybrid.system.variables import STATE, Variables
 
 CONDITION = "when"
 CLOCK = "clock"
@@ -20,7 +20,7 @@ CLOCK = "clock"
 class WholeReset:
     """A user's reset with all components as its value, also where it returns a dict of those that change.
 
-    ``state`` holds the names of the components, or their number.
+    ``state`` holds the names of all components, or their number.
     """
 
     function: Callable[..., Any]
@@ -56,6 +56,49 @@ def checked_changes(changed: Iterable[Any], state: tuple[str, ...] | int) -> tup
 
 
 @attrs.frozen
+class WholeField:
+    """A user's field with the rates of all components: ``still`` components at the end have the rate 0."""
+
+    function: Callable[..., Any]
+    still: int
+
+    def __call__(self, t: Any, x: Any, p: Any) -> Any:
+        """The rates, in order."""
+        return (*self.function(t, x, p), *(0.0,) * self.still)
+
+
+@attrs.frozen
+class MovingField:
+    """A field with the rates of all components, without those of the components that have none."""
+
+    function: Callable[..., Any]
+    moving: int
+
+    def __call__(self, t: Any, x: Any, p: Any) -> Any:
+        """The rates, in order."""
+        return self.function(t, x, p)[: self.moving]
+
+
+def moving_field(flow: Callable[..., Any], variables: Variables) -> Callable[..., Any]:
+    """The field of a mode whose rates of all components are given."""
+    return flow if variables.moving == variables.dimension else MovingField(flow, variables.moving)
+
+
+@attrs.frozen
+class WholeDerivative:
+    """A user's derivative of which the first ``kept`` rows count; ``memory`` follows."""
+
+    function: Callable[..., Any]
+    kept: int
+    memory: Callable[[int], list[list[float]]]
+
+    def __call__(self, t: Any, x: Any, p: Any) -> Any:
+        """The rows, in order."""
+        rows = [*self.function(t, x, p)][: self.kept]
+        return [*rows, *self.memory(len(rows[0]))]
+
+
+@attrs.frozen
 class ModelFunction:
     """One model function: a field, a guard, the condition of a guard, or a reset.
 
@@ -70,6 +113,11 @@ class ModelFunction:
         condition, which has no derivative.
     size
         Number of values, or None for a scalar.
+    still
+        How many of the values the user's function does not return, the last ones, which are 0: the rates of
+        the components of a field that are held or count.
+    counted
+        How many of the values, the last ones, are counters after a reset: no derivative is taken of them.
     completed
         Names of the state's components, or their number, if the function may return those that change alone:
         that of a reset. Else None.
@@ -82,11 +130,42 @@ class ModelFunction:
     derivative: Callable[..., Any] | None
     size: int | None
     completed: tuple[str, ...] | int | None = None
+    still: int = 0
+    counted: int = 0
 
     @property
     def value(self) -> Callable[..., Any]:
         """The function, which always returns all values."""
+        if self.still:
+            return WholeField(self.function, self.still)
         return self.function if self.completed is None else WholeReset(self.function, self.completed)
+
+    @property
+    def slopes(self) -> Callable[..., Any] | None:
+        """The given derivative with a row for every value; those of counters are never the user's."""
+        if self.derivative is None or not (self.still or self.counted):
+            return self.derivative
+        return WholeDerivative(self.derivative, self.kept, self.memory_rows)
+
+    @property
+    def returned(self) -> int:
+        """Number of values that the user's function returns, and of rows of a derivative that is given."""
+        return self.rows - self.still
+
+    @property
+    def kept(self) -> int:
+        """Number of rows of the derivative that are those of the user's function, the first ones."""
+        return self.rows - self.still - self.counted
+
+    def memory_rows(self, columns: int) -> list[list[float]]:
+        """The rows of the derivative behind those: zero for rates, of the identity for counters.
+
+        So a jump leaves the last components of a tangent vector, which are zero, as they are, and counters
+        change no determinant.
+        """
+        one = float(self.counted > 0)
+        places = range(self.kept, self.rows)
+        return [[one if j == i else 0.0 for j in range(columns)] for i in places]
 
     @property
     def identity(self) -> tuple[int, int, int | None]:
@@ -112,9 +191,11 @@ class ModelFunction:
         return f"{self.owner}: {self.derivative_name}"
 
 
-def field_function(mode: Mode, dimension: int) -> ModelFunction:
-    """The field of a mode."""
-    return ModelFunction(f"Mode {mode.name!r}", "field", mode.field, "jacobian", mode.jacobian, dimension)
+def field_function(mode: Mode, variables: Variables) -> ModelFunction:
+    """The field of a mode, with the rate 0 of components that have none."""
+    n, still = variables.dimension, variables.dimension - variables.moving
+    owner = f"Mode {mode.name!r}"
+    return ModelFunction(owner, "field", mode.field, "jacobian", mode.jacobian, n, still=still)
 
 
 def guard_function(transition: Transition) -> ModelFunction:
@@ -132,30 +213,34 @@ def condition_function(transition: Transition) -> ModelFunction | None:
     return ModelFunction(f"Transition {transition.name!r}", CONDITION, transition.guard.when, "", None, None)
 
 
-def reset_function(transition: Transition, state: tuple[str, ...] | int) -> ModelFunction | None:
+def reset_function(transition: Transition, variables: Variables) -> ModelFunction | None:
     """The reset of a transition; None for the identity."""
     reset = transition.reset
     if reset is None:
         return None
-    owner, n = f"Transition {transition.name!r}", _dimension(state)
-    return ModelFunction(owner, "reset", reset.function, "jacobian", reset.jacobian, n, state)
-
-
-def _dimension(state: tuple[str, ...] | int) -> int:
-    return state if isinstance(state, int) else len(state)
+    return ModelFunction(
+        f"Transition {transition.name!r}",
+        "reset",
+        reset.function,
+        "jacobian",
+        reset.jacobian,
+        variables.dimension,
+        variables.components,
+        counted=len(variables.counters),
+    )
 
 
 def functions_in(
-    modes: Sequence[Mode], transitions: Sequence[Transition], state: tuple[str, ...] | int
+    modes: Sequence[Mode], transitions: Sequence[Transition], variables: Variables
 ) -> Iterator[tuple[int, ModelFunction]]:
     """Every model function with the index of its mode or transition, fields first."""
     for index, mode in enumerate(modes):
-        yield index, field_function(mode, _dimension(state))
+        yield index, field_function(mode, variables)
     for index, transition in enumerate(transitions):
         yield index, guard_function(transition)
         condition = condition_function(transition)
         if condition is not None:
             yield index, condition
-        reset = reset_function(transition, state)
+        reset = reset_function(transition, variables)
         if reset is not None:
             yield index, reset

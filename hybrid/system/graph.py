@@ -24,7 +24,7 @@ from hybrid.system.laws import Laws, placed
 from hybrid.system.periodicity import Period, period_at
 from hybrid.system.portable import Portable
 from hybrid.system.switching import switching_inside
-from hybrid.system.variables import Variables, as_parameters, as_state
+from hybrid.system.variables import Variables, as_names, as_parameters, as_state
 from hybrid.system.watched import Watched
 
 if TYPE_CHECKING:
@@ -43,6 +43,14 @@ def _as_modes(value: Iterable[Mode]) -> tuple[Mode, ...]:
 
 def _as_transitions(value: Iterable[Transition]) -> tuple[Transition, ...]:
     return tuple(arguments.items("HybridSystem: transitions", value, "be a list of Transition objects"))
+
+
+def _as_held(value: Any) -> tuple[str, ...]:
+    return as_names(value, "held")
+
+
+def _as_counters(value: Any) -> tuple[str, ...]:
+    return as_names(value, "counters")
 
 
 def _as_period(value: Any) -> Any:
@@ -89,7 +97,15 @@ class HybridSystem(Portable):
     Parameters
     ----------
     state
-        Names of the components, or their number ``n`` (model functions then get a plain array).
+        Names of the components that fields move, or their number ``n`` (model functions then get a plain
+        array). A field returns one rate for each of these, and for no other component.
+    held
+        Names of components without a field, such as a sampled control: they stay as they are until a reset
+        changes them. Model functions read them from ``x``, behind the state, and tangent vectors have them.
+    counters
+        Names of whole numbers that resets alone change. Model functions read them from ``x``, last of all.
+        They have no tangent vectors: no exponent or multiplier belongs to them, and orbits close whatever
+        they count.
     parameters
         Default values by name; any call may override them.
     modes, transitions
@@ -140,9 +156,32 @@ class HybridSystem(Portable):
     ... )
     >>> len(hybrid.simulate(ball, (1.0, 0.0), (0.0, 3.0)).jumps)
     6
+
+    A control that is sampled each 0.1, and the number of samples:
+
+    >>> loop = hybrid.HybridSystem(
+    ...     state=("x",),
+    ...     held=("u",),
+    ...     counters=("n",),
+    ...     parameters={"k": 2.0},
+    ...     modes=[hybrid.Mode("run", lambda t, x, p: (x.x + x.u,))],
+    ...     transitions=[
+    ...         hybrid.Transition(
+    ...             "run",
+    ...             "run",
+    ...             hybrid.Every(0.1),
+    ...             hybrid.Reset(lambda t, x, p: {"u": -p.k * x.x, "n": x.n + 1}),
+    ...         )
+    ...     ],
+    ... )
+    >>> arc = hybrid.simulate(loop, {"x": 1.0}, (0.0, 1.0), tangent=True)
+    >>> arc["n"][-1].item(), arc.x.shape[1], arc.fundamental.shape
+    (10.0, 3, (2, 2))
     """
 
     state: tuple[str, ...] | int = attrs.field(kw_only=True, converter=as_state)
+    held: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=_as_held)
+    counters: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=_as_counters)
     parameters: Mapping[str, float] = attrs.field(factory=dict, kw_only=True, converter=as_parameters)
     modes: tuple[Mode, ...] = attrs.field(kw_only=True, converter=_as_modes)
     transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=_as_transitions)
@@ -200,7 +239,9 @@ class HybridSystem(Portable):
 
     def _heading(self) -> list[str]:
         units = self.units
-        state = ", ".join(with_unit(name, units.get(name)) for name in self.state_names)
+        told = [with_unit(name, units.get(name)) for name in self.state_names]
+        moving, tangent = self.variables.moving, self.tangent_dimension
+        state = ", ".join(told[:moving])
         if isinstance(self.state, int) and not any(name in units for name in self.state_names):
             state = f"{self.state} components"
         parameters = ", ".join(
@@ -212,6 +253,10 @@ class HybridSystem(Portable):
             f"parameters: {parameters or 'none'}",
             f"modes: {', '.join(map(repr, self.mode_names))}",
         ]
+        if self.counters:
+            lines.insert(2, f"counters: {', '.join(told[tangent:])}")
+        if self.held:
+            lines.insert(2, f"held: {', '.join(told[moving:tangent])}")
         if "t" in units:
             lines.insert(2, f"time: {with_unit('t', units['t'])}")
         if self.start is not None:
@@ -266,12 +311,17 @@ class HybridSystem(Portable):
     @cached_property
     def variables(self) -> Variables:
         """The state and the parameters, with the views of them that model functions get."""
-        return Variables(self.state, self.parameters)
+        return Variables(self.state, self.parameters, self.held, self.counters)
 
     @property
     def dimension(self) -> int:
-        """Number of state components ``n``."""
+        """Number of components ``n`` of ``x``: those with a field, those held, counters."""
         return self.variables.dimension
+
+    @property
+    def tangent_dimension(self) -> int:
+        """Number of components of a tangent vector: those of the state with a field, and those held."""
+        return self.variables.tangent_dimension
 
     @cached_property
     def turn_lengths(self) -> np.ndarray:
@@ -282,7 +332,7 @@ class HybridSystem(Portable):
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Names of the components; ``x0, x1, ...`` if only their number was given."""
+        """Names of all components of ``x``; ``x0, x1, ...`` if only their number was given."""
         return self.variables.state_names
 
     @cached_property
@@ -477,7 +527,7 @@ def starting_mode(system: HybridSystem, mode: str | None) -> str | None:
 
 def functions_of(system: HybridSystem) -> Iterator[tuple[int, ModelFunction]]:
     """Every model function with the index of its mode or transition, fields first."""
-    return functions_in(system.modes, system.transitions, system.state)
+    return functions_in(system.modes, system.transitions, system.variables)
 
 
 def watched_by(system: HybridSystem) -> Watched:

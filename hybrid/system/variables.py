@@ -82,31 +82,67 @@ class Variables:
     Attributes
     ----------
     state
-        Names of the components, or their number.
+        Names of the components that have a field, or their number.
     parameters
         Default values by name.
+    held
+        Names of the components that only resets change.
+    counters
+        Names of the whole numbers that only resets change.
     """
 
     state: tuple[str, ...] | int
     parameters: Mapping[str, float]
+    held: tuple[str, ...] = ()
+    counters: tuple[str, ...] = ()
 
     def __attrs_post_init__(self) -> None:
-        both = [name for name in self.state_names if name in self.parameters]
-        if both:
+        if isinstance(self.state, int) and (self.held or self.counters):
             raise ModelError(
-                f"HybridSystem: {', '.join(map(repr, both))} is the name of a state and of a parameter. A "
-                "name means one thing; rename one of the two."
+                f"HybridSystem: held and counters are read by name, and the {self.state} components of this "
+                "state have none. Name them with state=."
             )
+        kinds = {
+            "a state": self.state_names[: self.moving],
+            "held": self.held,
+            "a counter": self.counters,
+            "a parameter": self.parameters,
+        }
+        owner: dict[str, str] = {}
+        for kind, names in kinds.items():
+            for name in names:
+                other = owner.setdefault(name, kind)
+                if other != kind:
+                    raise ModelError(
+                        f"HybridSystem: {name!r} is the name of {other} and of {kind}. A name means one "
+                        "thing; rename one of the two."
+                    )
+
+    @property
+    def moving(self) -> int:
+        """Number of components that have a field, the first ones."""
+        return self.state if isinstance(self.state, int) else len(self.state)
+
+    @property
+    def tangent_dimension(self) -> int:
+        """Number of components that tangent vectors have: all but the counters, which come last."""
+        return self.moving + len(self.held)
 
     @property
     def dimension(self) -> int:
-        """Number of state components ``n``."""
-        return self.state if isinstance(self.state, int) else len(self.state)
+        """Number of state components ``n``: those with a field, those held, counters."""
+        return self.tangent_dimension + len(self.counters)
+
+    @cached_property
+    def components(self) -> tuple[str, ...] | int:
+        """Names of all components in order, or their number: what ``x`` is made of."""
+        return self.state if isinstance(self.state, int) else (*self.state, *self.held, *self.counters)
 
     @cached_property
     def state_names(self) -> tuple[str, ...]:
-        """Names of the components; ``x0, x1, ...`` if only their number was given."""
-        return tuple(f"x{i}" for i in range(self.state)) if isinstance(self.state, int) else self.state
+        """Names of all components; ``x0, x1, ...`` if only their number was given."""
+        names = self.components
+        return tuple(f"x{i}" for i in range(names)) if isinstance(names, int) else names
 
     @cached_property
     def parameter_names(self) -> tuple[str, ...]:
@@ -148,15 +184,17 @@ class Variables:
     def state_values(self, name: str, value: object) -> np.ndarray:
         """A finite state ``(n,)`` from the argument ``name``: numbers in order, or with names as labels.
 
-        Labels have a mapping, a Series of pandas, and a DataArray of xarray with a coordinate of names.
+        Labels have a mapping, a Series of pandas, and a DataArray of xarray with a coordinate of names. Held
+        components and counters are 0 where labels leave them out, or numbers in order stop before them.
 
         Raises
         ------
         ArgumentError
-            If the shape is wrong, or a component is missing, unknown or not finite.
+            If the shape is wrong, a component is missing, unknown or not finite, or a counter is no whole
+            number.
         """
         names = self.state_names
-        by_name = self.components(name, value)
+        by_name = self.by_component(name, value)
         if by_name is not None:
             value = [by_name[component] for component in names]
         found = arguments.floats(value)
@@ -165,6 +203,8 @@ class Variables:
                 f"{name} must hold {self.dimension} numbers; got {arguments.shown(value)}. "
                 f"The state is {', '.join(names)}."
             )
+        if found.shape == (self.moving,):
+            found = np.append(found, np.zeros(self.dimension - self.moving))
         if found.shape != (self.dimension,):
             raise ArgumentError(
                 f"{name} has shape {found.shape}; the state needs shape ({self.dimension},): "
@@ -175,9 +215,12 @@ class Variables:
             pairs = zip(names, values, strict=True)
             component, bad = next(pair for pair in pairs if not isfinite(pair[1]))
             raise ArgumentError(f"{name}: component {component!r} must be finite; got {bad}.")
+        for component, number in zip(self.counters, values[self.tangent_dimension :], strict=True):
+            if not number.is_integer():
+                raise ArgumentError(f"{name}: counter {component!r} must be a whole number; got {number}.")
         return found
 
-    def components(self, name: str, value: object) -> dict[str, Any] | None:
+    def by_component(self, name: str, value: object) -> dict[str, Any] | None:
         """What the argument ``name`` gives for each component, if it has labels; else None.
 
         Raises
@@ -190,6 +233,7 @@ class Variables:
             return None
         for component in given:
             arguments.known(f"{name}: State component", component, self.state_names, "State components")
+        given = dict.fromkeys(self.state_names[self.moving :], 0.0) | given
         missing = [component for component in self.state_names if component not in given]
         if missing:
             raise ArgumentError(
@@ -200,8 +244,8 @@ class Variables:
 
     def state_view(self, values: Any) -> Any:
         """The state as model functions get it: by name, or a read-only array without names."""
-        if not isinstance(self.state, int):
-            return named_values(STATE, self.state, values)
+        if not isinstance(self.components, int):
+            return named_values(STATE, self.components, values)
         view = np.asarray(values).view()
         view.flags.writeable = False
         return view
@@ -249,6 +293,17 @@ def as_state(value: Any) -> tuple[str, ...] | int:
     if not names:
         raise ModelError("HybridSystem: state needs at least one component; got an empty sequence.")
     _check_identifiers(names, "state")
+    return names
+
+
+def as_names(value: Any, what: str) -> tuple[str, ...]:
+    """Names of held components or of counters; ``what`` is the argument."""
+    if isinstance(value, str) or (
+        not isinstance(value, Sequence) and not (isinstance(value, np.ndarray) and value.ndim == 1)
+    ):
+        raise arguments.refusal(f"HybridSystem: {what}", "be a tuple of names", value)
+    names = tuple(map(plain_name, value))
+    _check_identifiers(names, what)
     return names
 
 

@@ -204,7 +204,7 @@ class Case:
 
     def after(self, transition: Transition, t: float, x: Any) -> np.ndarray:
         """The state ``(n,)`` after a transition from ``(t, x)``."""
-        reset = reset_function(transition, self.system.state)
+        reset = reset_function(transition, self.system.variables)
         return np.array(x, dtype=float) if reset is None else self.evaluate(reset.value, t, x)
 
     def is_wall(self, transition: Transition) -> bool:

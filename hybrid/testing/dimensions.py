@@ -257,7 +257,7 @@ def _faults(
     p = [Quantity(unit_of(units.get(name, "")), names=(f"p.{name}",)) for name in names]
     algebra = UnitAlgebra()
     try:
-        values = values_of(function, system.state, names, algebra, (t, x, p))
+        values = values_of(function, system.variables.components, names, algebra, (t, x, p))
     except Exception:
         return None
     for value, (what, unit) in zip(values, wanted.items(), strict=False):

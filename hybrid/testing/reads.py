@@ -12,7 +12,7 @@ from hybrid.expression.reads import TIME, names_read
 from hybrid.expression.values import TraceError
 from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Reset, Transition
-from hybrid.system.functions import WholeReset
+from hybrid.system.functions import WholeReset, field_function
 from hybrid.system.graph import HybridSystem, as_system, functions_of, watched_by
 from hybrid.testing.errors import PropertyError, discard
 
@@ -42,16 +42,17 @@ def _is_passed(system: HybridSystem, transition: Transition) -> bool:
     if transition.source != transition.target or transition.reset is None:
         return False
     mode = system.modes[system.mode_index(transition.source)]
+    rates = field_function(mode, system.variables).value
     for i, name in enumerate(system.state_names):
         if name in felt:
-            felt |= names_read(system, lambda t, x, p, i=i: mode.field(t, x, p)[i])
+            felt |= names_read(system, lambda t, x, p, i=i: rates(t, x, p)[i])
     changed = _changed(system, transition.reset)
     return bool(changed) and felt.isdisjoint(changed)
 
 
 def _changed(system: HybridSystem, reset: Reset) -> set[str]:
     """The components that a reset changes, at some points."""
-    variables, whole = system.variables, WholeReset(reset.function, system.state)
+    variables, whole = system.variables, WholeReset(reset.function, system.variables.components)
     changed = np.zeros(system.dimension, dtype=bool)
     for t, x in sample_points(system.dimension):
         values = evaluate(variables, whole, t, x, variables.defaults)

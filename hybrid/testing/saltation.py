@@ -197,7 +197,7 @@ def check_flow_direction(case: Case) -> None:
         if case.follows_at_once(jump):
             continue
         transition = case.transition(jump)
-        felt = [guard_function(transition), reset_function(transition, case.system.state)]
+        felt = [guard_function(transition), reset_function(transition, case.system.variables)]
         slopes = [
             case.slope(function, jump.transition, jump.t, jump.x_minus)
             for function in felt
@@ -272,7 +272,7 @@ def _divergence(case: Case) -> tuple[float, float]:
         if arc.j[i] != arc.j[i + 1] or h <= 0.0:
             continue
         mode = system.mode_index(str(arc.mode[i]))
-        function = field_function(system.modes[mode], system.dimension)
+        function = field_function(system.modes[mode], system.variables)
         times = arc.t[i] + 0.5 * h * (1.0 + GAUSS_NODES)
         for t, x, weight in zip(times, arc(times), GAUSS_WEIGHTS, strict=True):
             term = 0.5 * h * weight * np.trace(compiled.derivative(function, mode, t, x, parameters))
@@ -388,7 +388,7 @@ def _guard_slope(case: Case, jump: Jump) -> np.ndarray:
 
 
 def _field_slope(case: Case, mode: str, t: float, x: np.ndarray) -> np.ndarray:
-    function = field_function(case.mode_of(mode), case.system.dimension)
+    function = field_function(case.mode_of(mode), case.system.variables)
     return case.slope(function, mode, t, x)[:, :-1]
 
 
@@ -397,7 +397,7 @@ def _terms(case: Case, jump: Jump) -> np.ndarray:
     sizes = np.zeros(case.system.dimension)
     for name, x in ((jump.source, jump.x_minus), (mode_after(jump), jump.x_plus)):
         mode = case.mode_of(name)
-        slope = np.abs(case.slope(field_function(mode, case.system.dimension), name, jump.t, x))
+        slope = np.abs(case.slope(field_function(mode, case.system.variables), name, jump.t, x))
         sizes += slope[:, :-1] @ case.run.scale + slope[:, -1] * case.duration
         sizes += np.abs(case.evaluate(mode.field, jump.t, x))
     return sizes

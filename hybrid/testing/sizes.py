@@ -34,12 +34,12 @@ def sizes_along(
     for jump in arc.jumps:
         places.append((jump.source, jump.t, jump.x_minus))
         index = system.transition_index(jump.transition)
-        reset = reset_function(system.transitions[index], system.state)
+        reset = reset_function(system.transitions[index], system.variables)
         if reset is not None:
             made = np.maximum(made, _absolute(derivative(reset, index, jump.t, jump.x_minus)) @ size)
     for mode, t, x in places:
         index = system.mode_index(mode)
-        function = field_function(system.modes[index], system.dimension)
+        function = field_function(system.modes[index], system.variables)
         slopes = _absolute(derivative(function, index, t, x))
         rates = evaluate(system.variables, function.value, t, x, values)
         speeds = np.zeros_like(size) if rates is None else np.abs(rates)

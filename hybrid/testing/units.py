@@ -133,7 +133,7 @@ def _measured(system: HybridSystem) -> Measured:
             if isinstance(system.state, int):
                 place = x / unit
             else:
-                place = named_values(STATE, system.state, [x[i] / unit for i in range(n)])
+                place = named_values(STATE, system.state_names, [x[i] / unit for i in range(n)])
             return function(t / getattr(p, time), place, named_values(PARAMETERS, names, p[: len(names)]))
 
         return called
@@ -147,7 +147,7 @@ def _measured(system: HybridSystem) -> Measured:
         if transition.reset is None and source == target:
             return None
         reset = (lambda t, x, p: x) if transition.reset is None else transition.reset.function
-        values = original(WholeReset(reset, system.state), source)
+        values = original(WholeReset(reset, system.variables.components), source)
         return Reset(lambda t, x, p: [value * getattr(p, units[target]) for value in values(t, x, p)])
 
     def period(p: Any) -> Any:

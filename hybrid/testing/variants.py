@@ -127,7 +127,7 @@ def _altered(system: HybridSystem) -> Altered:
     unaware = _unaware_of_more(system)
 
     def whole(reset: Callable[..., Any]) -> Callable[..., Any]:
-        return WholeReset(reset, system.state)
+        return WholeReset(reset, system.variables.components)
 
     for mode in system.modes:
         field = mode if stay else Mode(mode.name, unaware(mode.field), jacobian=unaware(mode.jacobian))

@@ -87,7 +87,7 @@ def projection(pieces: Pieces, cell: Cell, left: Sequence[int]) -> Function:
             x = pieces.between(dict(cell.branches), number).projection(t, x, p)
         return x
 
-    return expressed(trace(projected, pieces.variables.state, pieces.variables.parameter_names))
+    return expressed(trace(projected, pieces.variables.components, pieces.variables.parameter_names))
 
 
 def are_apart(pieces: Pieces, sides: Sides, on: Sequence[int]) -> bool:
@@ -157,7 +157,7 @@ def speeds(pieces: Pieces, sides: Sides, number: int) -> tuple[Expression, Expre
 def rate_of(pieces: Pieces, number: int, flow: Function) -> Expression:
     """The rate of a surface's height along a flow."""
     surfaces, variables = pieces.surfaces, pieces.variables
-    field = trace(flow, variables.state, variables.parameter_names)
+    field = trace(flow, variables.components, variables.parameter_names)
     [[*normal, own]] = jacobian_of([surfaces.known[number].height], surfaces.symbols.variables)
     terms = (slope * rate for slope, rate in zip(normal, field, strict=True) if slope != 0)
     return sum(terms, ZERO) + own

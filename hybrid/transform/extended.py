@@ -7,12 +7,13 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import attrs
+import numpy as np
 
 from hybrid.expression.reads import names_read
 from hybrid.expression.values import TraceError
 from hybrid.system.clocks import Clock, DerivedClock, numbers_of
 from hybrid.system.elements import Guard, Mode, Reset, Transition
-from hybrid.system.functions import WholeReset
+from hybrid.system.functions import WholeField, WholeReset
 from hybrid.system.graph import HybridSystem
 from hybrid.system.laws import Laws
 from hybrid.system.variables import PARAMETERS, STATE, named_values
@@ -21,9 +22,9 @@ _EXTENDED: WeakKeyDictionary[HybridSystem, dict[tuple[str, ...], HybridSystem]] 
 
 
 def extended(system: HybridSystem, names: tuple[str, ...]) -> HybridSystem:
-    """The system whose state ends with these parameters, which every field and reset leaves as they are.
+    """The system with these parameters as held components, the last ones, that every reset leaves as they are.
 
-    A tangent vector along such a component is the derivative of the flow in the parameter, and a guard that
+    In a state without names they are components at its end whose rates are 0. A tangent vector along such a component is the derivative of the flow in the parameter, and a guard that
     moves with the parameter has a gradient there, so that the saltation matrix moves the event. If the period
     depends on one of the parameters the system has none: time is a plain number.
     """
@@ -33,22 +34,31 @@ def extended(system: HybridSystem, names: tuple[str, ...]) -> HybridSystem:
     return made[names]
 
 
+def with_parameters(system: HybridSystem, x: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """A state of an extended system: that of the original, and behind what has tangent vectors the parameters.
+
+    ``x`` may also be such a state, with other values.
+    """
+    m = len(values)
+    last = system.tangent_dimension
+    counters = system.dimension - last
+    return np.concatenate([x[: last - m], values, x[len(x) - counters :]])
+
+
 class _Extension:
     def __init__(self, system: HybridSystem, names: tuple[str, ...]) -> None:
         self.original, self.names = system, names
-        self.places = {name: system.dimension + i for i, name in enumerate(names)}
+        self.first, self.last = system.tangent_dimension, system.tangent_dimension + len(names)
+        self.places = {name: self.first + i for i, name in enumerate(names)}
         self.kept = tuple(name for name in system.parameters if name not in names)
 
     def system(self) -> HybridSystem:
         original = self.original
-        state: tuple[str, ...] | int = (
-            original.state + len(self.names)
-            if isinstance(original.state, int)
-            else (*original.state, *self.names)
-        )
+        unnamed = isinstance(original.state, int)
         return attrs.evolve(
             original,
-            state=state,
+            state=self.last if unnamed else original.state,
+            held=original.held if unnamed else (*original.held, *self.names),
             parameters={name: original.parameters[name] for name in self.kept},
             modes=[self._mode(mode) for mode in original.modes],
             transitions=[self._transition(each) for each in original.transitions],
@@ -60,15 +70,22 @@ class _Extension:
         )
 
     def _mode(self, mode: Mode) -> Mode:
-        rates, still = self._function(mode.field), (0.0,) * len(self.names)
-        return attrs.evolve(mode, field=lambda t, x, p: (*rates(t, x, p), *still), jacobian=None)
+        rates = self._function(mode.field)
+        if isinstance(self.original.state, int):
+            rates = WholeField(rates, len(self.names))
+        return attrs.evolve(mode, field=rates, jacobian=None)
 
     def _transition(self, transition: Transition) -> Transition:
-        guard, reset, n = transition.guard, transition.reset, self.original.dimension
+        guard, reset, first, last = transition.guard, transition.reset, self.first, self.last
         new = None
         if reset is not None:
-            values = self._function(WholeReset(reset.function, self.original.state))
-            new = Reset(lambda t, x, p: (*values(t, x, p), *x[n:]))
+            values = self._function(WholeReset(reset.function, self.original.variables.components))
+
+            def after(t: Any, x: Any, p: Any) -> Any:
+                found = tuple(values(t, x, p))
+                return (*found[:first], *x[first:last], *found[first:])
+
+            new = Reset(after)
         when = None if guard.when is None else self._function(guard.when)
         moved: Guard | Clock
         if isinstance(guard, Clock):
@@ -107,11 +124,13 @@ class _Extension:
 
     def _function(self, function: Callable[..., Any]) -> Callable[..., Any]:
         """A function of the original system as one of the extended state."""
-        original, n = self.original, self.original.dimension
+        original, first, last = self.original, self.first, self.last
 
         def called(t: Any, x: Any, p: Any) -> Any:
-            is_plain = isinstance(original.state, int)
-            own = x[:n] if is_plain else named_values(STATE, original.state_names, x[:n])
+            if isinstance(original.state, int):
+                own = x[:first]
+            else:
+                own = named_values(STATE, original.state_names, (*x[:first], *x[last:]))
             return function(t, own, self._all_parameters(x, p))
 
         return called

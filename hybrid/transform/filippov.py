@@ -163,7 +163,7 @@ def _check_traceable(variables: Variables, below: Function, above: Function, swi
     n = variables.dimension
     for what, function, size in (("below", below, n), ("above", above, n), ("switching", switching, 1)):
         try:
-            values = trace(function, variables.state, variables.parameter_names)
+            values = trace(function, variables.components, variables.parameter_names)
         except TraceError as error:
             raise ModelError(
                 f"filippov: {what} cannot be traced, but the sliding mode is derived from it: {error}."

@@ -23,7 +23,7 @@ from hybrid.expression.tracing import TraceError, model_symbols, trace
 from hybrid.system.clocks import Clock
 from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
-from hybrid.system.functions import WholeReset
+from hybrid.system.functions import WholeReset, field_function, moving_field
 from hybrid.system.graph import HybridSystem, watched_by
 from hybrid.transform import corners
 from hybrid.transform.cells import Cell, Choice, Pieces
@@ -139,7 +139,8 @@ class Splitter:
                 cell = self._cell_at(pieces, self._values(t, x, parameters))
                 flow = pieces.flow(dict(cell.branches))
                 whole, part = (
-                    evaluate(self.variables, each, t, x, parameters) for each in (mode.field, flow)
+                    evaluate(self.variables, each, t, x, parameters)
+                    for each in (field_function(mode, self.variables).value, flow)
                 )
                 if whole is None or part is None:
                     continue
@@ -210,14 +211,14 @@ class Splitter:
 
     def _traced(self, what: str, function: Function) -> list[Expression]:
         try:
-            return trace(function, self.variables.state, self.variables.parameter_names)
+            return trace(function, self.variables.components, self.variables.parameter_names)
         except TraceError as error:
             raise ModelError(
                 f"split: {what} cannot be traced, so its kinks and jumps cannot be found: {error}."
             ) from error
 
     def _pieces(self, index: int, mode: Mode) -> Pieces:
-        field = self._traced(f"the field of mode {mode.name!r}", mode.field)
+        field = self._traced(f"the field of mode {mode.name!r}", field_function(mode, self.variables).value)
         watched = [
             each.guard
             for each in self.outgoing
@@ -229,7 +230,7 @@ class Splitter:
         if transition.clock is not None:
             return None
         try:
-            [guard] = trace(transition.guard.function, self.variables.state, self.variables.parameter_names)
+            [guard] = trace(transition.guard.function, self.variables.components, self.variables.parameter_names)
         except TraceError:
             return None
         return guard
@@ -238,8 +239,8 @@ class Splitter:
         if transition.reset is None:
             return [*self.symbols.x]
         try:
-            reset = WholeReset(transition.reset.function, self.variables.state)
-            return trace(reset, self.variables.state, self.variables.parameter_names)
+            reset = WholeReset(transition.reset.function, self.variables.components)
+            return trace(reset, self.variables.components, self.variables.parameter_names)
         except TraceError:
             return None
 
@@ -248,7 +249,7 @@ class Splitter:
         if not cell.branches:
             return attrs.evolve(original, name=self.name_of(cell), part_of=original.name)
         flow = self.pieces[cell.mode].flow(dict(cell.branches))
-        return Mode(self.name_of(cell), flow, part_of=original.name)
+        return Mode(self.name_of(cell), moving_field(flow, self.variables), part_of=original.name)
 
     def _edges(self, cell: Cell) -> Iterator[Edge]:
         for number, side in cell.sides:
@@ -365,7 +366,7 @@ class Splitter:
         return scalar(self._condition(function))
 
     def _condition(self, function: Function) -> Expression:
-        [condition] = trace(function, self.variables.state, self.variables.parameter_names)
+        [condition] = trace(function, self.variables.components, self.variables.parameter_names)
         return condition
 
     def _on(

@@ -60,7 +60,7 @@ class SwitchingSurface:
         from hybrid.expression.polynomials import is_zero
         from hybrid.expression.tracing import trace
 
-        L_b, L_a = trace(self.speeds, self.variables.state, self.variables.parameter_names)
+        L_b, L_a = trace(self.speeds, self.variables.components, self.variables.parameter_names)
         return not is_zero(L_b - L_a)
 
     def speeds(self, t: Any, x: Any, p: Any) -> tuple[Any, ...]:
@@ -81,7 +81,7 @@ class SwitchingSurface:
                 for b, a in zip(self.below(t, x, p), self.above(t, x, p), strict=True)
             ]
 
-        traced = trace(field, self.variables.state, self.variables.parameter_names)
+        traced = trace(field, self.variables.components, self.variables.parameter_names)
         return expressed([_cancelled(each) for each in traced])
 
     def arrives_from_below(self, t: Any, x: Any, p: Any) -> Any:
@@ -171,7 +171,7 @@ def _derived_gradient(variables: Variables, function: Function) -> Function:
 
     names = variables.parameter_names
     symbols = model_symbols(variables.dimension, len(names))
-    [row] = jacobian_of(trace(function, variables.state, names), symbols.variables)
+    [row] = jacobian_of(trace(function, variables.components, names), symbols.variables)
     return expressed(row)
 
 
@@ -184,7 +184,7 @@ def _rate(variables: Variables, gradient: Function, field: Function) -> Function
         *normal, own = gradient(t, x, p)
         return _dot(normal, field(t, x, p), own)
 
-    [expression] = trace(rate, variables.state, variables.parameter_names)
+    [expression] = trace(rate, variables.components, variables.parameter_names)
     return scalar(expression)
 
 

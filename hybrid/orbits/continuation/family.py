@@ -201,7 +201,7 @@ class Family:
                 rate = self._rate(system.mode_index(transition.source), t, state)
                 parts.append((moved[:n], own, rate))
                 moved, own = np.eye(len(state), len(state) + 1), gradient
-            reset = reset_function(transition, system.state)
+            reset = reset_function(transition, system.variables)
             if reset is not None:
                 slopes = compiled.derivative(reset, index, t, state, p)
                 state = compiled.value(reset, index, t, state, p)
@@ -224,7 +224,7 @@ class Family:
 
     def _rate(self, mode: int, t: float, state: np.ndarray) -> np.ndarray:
         n = self.system.dimension
-        function = field_function(self.extended.modes[mode], self.extended.dimension)
+        function = field_function(self.extended.modes[mode], self.extended.variables)
         return self.compiled.value(function, mode, t, state, self._others)[:n]
 
     def rate(self, mode: str, t: float, x: np.ndarray, values: np.ndarray) -> np.ndarray:

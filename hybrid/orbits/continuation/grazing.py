@@ -60,7 +60,7 @@ def _touch_of(orbit: Pass, key: Key) -> _Touch | None:
     system = family.extended
     index = system.transition_index(key.name)
     transition = system.transitions[index]
-    reset = reset_function(transition, system.state)
+    reset = reset_function(transition, system.variables)
     if reset is None:
         return None
     share = extremum(key, orbit)[0] % 1.0 if key.kind == "top" else 1.0
