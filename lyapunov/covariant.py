@@ -15,7 +15,7 @@ from hybrid.display.progress import progress_bar
 from hybrid.display.tables import counted
 from hybrid.orbits.triangles import Interval, Triangles
 from hybrid.simulation.ending import status_of
-from hybrid.simulation.labelled import Names, attributes
+from hybrid.simulation.labelled import Names, attributes, with_counters
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.growth import growing
@@ -84,7 +84,7 @@ class CovariantVectors:
 
         return xarray.Dataset(
             {
-                "vectors": (("sample", "state", "exponent"), self.vectors),
+                "vectors": (("sample", "state", "exponent"), with_counters(self.vectors, len(self.names.state))),
                 "exponents": ("exponent", self.exponents, self.names.rate),
                 "standard_error": ("exponent", self.standard_error, self.names.rate),
                 "growths": (("sample", "exponent"), self.growths, self.names.rate),
@@ -196,7 +196,7 @@ def covariant_vectors(
 def _result(
     trajectory: Trajectory, passed: list[Interval], count: int, length: float, code: int
 ) -> CovariantVectors:
-    n = trajectory.model.dimension
+    n = trajectory.system.tangent_dimension
     vectors, growths = _backward(passed, n, count)
     kept = passed[:count]
     by_basis = np.array([each.growth for each in kept]).reshape(-1, n) / length
@@ -213,7 +213,7 @@ def _result(
         growths=growths / length,
         angles=angles_between(vectors[:, :, (exponents > 0) & ~zero], vectors[:, :, (exponents < 0) & ~zero]),
         t=np.array([each.t for each in kept]),
-        x=np.array([each.x for each in kept]).reshape(-1, n),
+        x=np.array([each.x for each in kept]).reshape(-1, trajectory.model.dimension),
         mode=np.array([each.mode for each in kept], dtype=str),
         interval=length,
         status=status_of(trajectory, code),

@@ -82,7 +82,7 @@ def finite_time_exponents(
     one = starts.ndim == 1
     if not one:
         _check(system, starts)
-    found = np.full((1 if one else len(starts), count, system.dimension), np.nan)
+    found = np.full((1 if one else len(starts), count, system.tangent_dimension), np.nan)
     failures = []
     for i, each in enumerate(starts[None] if one else starts):
         try:
@@ -93,7 +93,7 @@ def finite_time_exponents(
                 mode=mode,
                 parameters=parameters,
                 solver=solver,
-                tangent=np.eye(system.dimension),
+                tangent=np.eye(system.tangent_dimension),
             )
             _fill(found[i], trajectory, interval_length(trajectory, interval, count))
         except HybridError as failure:

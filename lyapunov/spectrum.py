@@ -254,7 +254,7 @@ def lyapunov_spectrum(
 
 def first_vectors(system: HybridSystem, k: int | None) -> np.ndarray:
     """Tangent vectors ``(n, k)`` to start with; all ``n`` for None."""
-    n = compile_system(system).system.dimension
+    n = compile_system(system).system.tangent_dimension
     directions = n if k is None else arguments.count("k", k, 1, n, ", the dimension of the state")
     return generic_directions(n, directions)
 
@@ -429,7 +429,8 @@ class Estimate:
         run, n = self.trajectory.run, self.trajectory.model.dimension
         if run.y[n:].all():
             return
-        vectors = run.y[n:].reshape(-1, n)
+        vectors = run.y[n:].reshape(-1, n)[:, : self.trajectory.system.tangent_dimension]
+        n = vectors.shape[1]
         gone = ~vectors.any(axis=1)
         if gone.any():
             kept = vectors[~gone]

@@ -20,7 +20,7 @@ from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
-from hybrid.system.graph import as_system
+from hybrid.system.graph import as_system, refuse_counters
 from hybrid.system.growth import growing
 from lyapunov.interval import end_at
 from lyapunov.spectrum import INTERVALS_AT_ONCE, interval_length
@@ -208,6 +208,7 @@ def two_orbit_exponents(
     transient = arguments.count("transient", transient, 0)
     separation = arguments.positive("separation", separation, "be a positive distance")
     progress = arguments.flag("progress", progress)
+    refuse_counters(system, "two_orbit_exponents")
     reference = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver)
     offset = separation * _unit_vector(direction, system)
     length = interval_length(reference, interval, transient + intervals)

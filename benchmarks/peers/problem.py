@@ -102,7 +102,7 @@ def equations(system: HybridSystem) -> Equations:
     known |= zip(symbols.p, map(sympy.Float, system.parameter_values()), strict=True)
 
     def expressions(function: Callable[..., Any]) -> tuple[sympy.Expr, ...]:
-        return tuple(_in_sympy(e, known) for e in trace(function, system.state, names))
+        return tuple(_in_sympy(e, known) for e in trace(function, system.variables.components, names))
 
     exits = tuple(
         tuple(

@@ -100,7 +100,7 @@ def fundamental_eigenvalues(start: Callable[[], Trajectory], t: float) -> Produc
     The run is repeated in other units of the states if those of the model are far from suiting it.
     """
     trajectory = start()
-    units = np.ones(trajectory.model.dimension)
+    units = np.ones(trajectory.system.tangent_dimension)
     for attempt in range(MOST_ATTEMPTS):
         factors = fundamental_factors(trajectory if attempt == 0 else start(), t, units)
         if factors.code != codes.DONE or not all(np.all(np.isfinite(each)) for each in factors.matrices):

@@ -26,6 +26,7 @@ class Held:
     parameters: np.ndarray
     laws: tuple[Law, ...]
     values: np.ndarray
+    counters: np.ndarray
 
     def departure(self, t: float, x: np.ndarray, magnitude: np.ndarray) -> Departure | None:
         """How far a point is from the held values; None if a quantity has no value or slope there."""
@@ -57,7 +58,14 @@ class Held:
 
     def _at(self, t: float, x: np.ndarray) -> np.ndarray:
         found = [
-            evaluate(self.system.variables, law.function, t, x, self.parameters, finite=False)
+            evaluate(
+                self.system.variables,
+                law.function,
+                t,
+                np.append(x, self.counters),
+                self.parameters,
+                finite=False,
+            )
             for law in self.laws
         ]
         return np.array([np.nan if each is None else each[0] for each in found])
@@ -69,7 +77,9 @@ class Held:
         return np.stack(columns, axis=-1)
 
 
-def held_by(system: HybridSystem, parameters: np.ndarray, shot: Shot, share: float) -> Held | None:
+def held_by(
+    system: HybridSystem, parameters: np.ndarray, shot: Shot, share: float, counters: np.ndarray
+) -> Held | None:
     """The conserved quantities of a system, at their values at the start of a shot; None if it has none."""
     if not system.laws.conserved or not shot.whole:
         return None
@@ -77,5 +87,5 @@ def held_by(system: HybridSystem, parameters: np.ndarray, shot: Shot, share: flo
     laws = tuple(law for law in laws_of(system).conserved if law.holds_in(mode.name, mode.part_of))
     if not laws:
         return None
-    found = Held(system, parameters, laws, np.zeros(len(laws)))
+    found = Held(system, parameters, laws, np.zeros(len(laws)), counters)
     return attrs.evolve(found, values=found._at(shot.point.t, shot.point.x)).kept(shot, share)

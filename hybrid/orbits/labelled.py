@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.display.tables import html_table, with_unit
-from hybrid.simulation.labelled import Names, attributes
+from hybrid.simulation.labelled import Names, attributes, with_counters
 from hybrid.status import StatusCode
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def labelled_orbit(orbit: Any) -> xarray.Dataset:
         "period": ((), orbit.period, names.of("t")),
         "multipliers": ("multiplier", np.asarray(orbit.multipliers, dtype=complex)),
         "log_moduli": ("multiplier", orbit.log_moduli),
-        "fundamental": (("state", "direction"), orbit.fundamental),
+        "fundamental": (("state", "direction"), with_counters(orbit.fundamental, len(names.state))),
         "residual": orbit.residual,
         "iterations": orbit.iterations,
     }

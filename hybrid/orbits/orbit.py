@@ -154,6 +154,7 @@ class PeriodicOrbit:
 
 
 def turns_over(system: HybridSystem, change: np.ndarray) -> dict[str, int]:
-    """Whole turns of each angle in a change ``(n,)`` of the state, by name."""
-    turns = dict(zip(system.state_names, whole_turns(change, system.turn_lengths).tolist(), strict=True))
+    """Whole turns of each angle in a change of the state, which leaves out the counters, by name."""
+    lengths = system.turn_lengths[: len(change)]
+    turns = dict(zip(system.state_names, whole_turns(change, lengths).tolist(), strict=False))
     return {name: int(turns[name]) for name in system.angles}

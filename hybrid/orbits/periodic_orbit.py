@@ -68,7 +68,7 @@ def periodic_orbit(
     Returns
     -------
     PeriodicOrbit
-        It closes up to whole turns of the angles that the system declares. If Newton's method did not
+        It closes up to whole turns of the angles that the system declares, and counters go on counting. If Newton's method did not
         converge the status says how far it came. An equilibrium of a forced system counts as an orbit,
         because it repeats after each forcing period; an equilibrium of an autonomous system does not.
 
@@ -94,13 +94,13 @@ def periodic_orbit(
     as_system("system", system)
     periods = arguments.count("periods", periods, 1)
     max_iterations = arguments.count("max_iterations", max_iterations, 0)
-    guess = system.variables.state_values("x0", x0)
+    guess, counters = np.split(system.variables.state_values("x0", x0), [system.tangent_dimension])
     t0 = arguments.number("t0", t0)
     tolerance = arguments.positive("tolerance", tolerance, "be above 0 and below 1")
     if not tolerance < 1.0:
         raise arguments.refusal("tolerance", "be above 0 and below 1", tolerance)
     method = DOP853(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
-    shooting = Shooting(system, mode, parameters, method)
+    shooting = Shooting(system, mode, parameters, method, counters)
     forcing = system.forcing_period(parameters)
     if forcing is not None:
         if period is not None:

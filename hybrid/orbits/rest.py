@@ -71,7 +71,7 @@ def _integrals(trajectory: Trajectory, times: np.ndarray) -> tuple[np.ndarray, n
     Jumps at ``times`` add what they change. The last array is the integral of the rates' moduli. All
     are nan where the run does not reach its end.
     """
-    n = trajectory.model.dimension
+    n = trajectory.system.tangent_dimension
     fine, coarse, size = (np.zeros((n, 1 + n)) for _ in range(3))
     repeats = jumps_at_once(trajectory)
     changed = _jumped(trajectory) if repeats else np.zeros((n, 1 + n))
@@ -102,12 +102,19 @@ def _to(trajectory: Trajectory, t: float) -> int:
 
 def _rates(trajectory: Trajectory) -> np.ndarray:
     """Time derivatives ``(n, 1 + n)`` of the state and of the tangent vectors."""
-    return np.column_stack([trajectory.field(), trajectory.jacobian() @ trajectory.tangent_matrix])
+    n = trajectory.system.tangent_dimension
+    return np.column_stack(
+        [trajectory.field()[:n], trajectory.jacobian()[:n, :n] @ trajectory.tangent_matrix]
+    )
 
 
 def _jumped(trajectory: Trajectory) -> np.ndarray:
     """Make the jumps at which the trajectory stands; what they add ``(n, 1 + n)`` to state and vectors."""
-    before = np.column_stack([trajectory.x, trajectory.tangent_matrix])
-    run = trajectory.run
+    before, run = _state_and_vectors(trajectory), trajectory.run
     trajectory.advance_to(int(run.cycle), float(run.phase), trajectory.no_record(), max_steps=int(run.steps))
-    return np.column_stack([trajectory.x, trajectory.tangent_matrix]) - before
+    return _state_and_vectors(trajectory) - before
+
+
+def _state_and_vectors(trajectory: Trajectory) -> np.ndarray:
+    """The state without counters, and the tangent vectors: ``(n, 1 + n)``."""
+    return np.column_stack([trajectory.x[: trajectory.system.tangent_dimension], trajectory.tangent_matrix])

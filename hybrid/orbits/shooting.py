@@ -67,21 +67,29 @@ HOLD_IT = (
 
 @attrs.frozen(eq=False)
 class Shooting:
-    """Searches for orbits of one system, with the conserved quantities that are held."""
+    """Searches for orbits of one system, with the conserved quantities that are held.
+
+    Counters are no unknowns: they begin with ``counters``, and end with whatever they have counted.
+    """
 
     system: HybridSystem
     mode: str | None
     parameters: Mapping[str, float] | None
     solver: Solver
+    counters: np.ndarray
     held: Held | None = None
+
+    def whole(self, point: Point) -> np.ndarray:
+        """The state at a point, with the counters."""
+        return np.append(point.x, self.counters)
 
     def shoot(self, point: Point) -> Shot:
         """One run over the period of a point, with the columns of the identity."""
-        trajectory = self._trajectory(point, self.mode)
-        mode, field = trajectory.mode, trajectory.field()
+        trajectory, n = self._trajectory(point, self.mode), self.system.tangent_dimension
+        mode, field = trajectory.mode, trajectory.field()[:n]
         code = advance_to_close(trajectory, *split_time(point.t + point.period, trajectory.model.period))
         arc = self._follow(point, point.period, mode)
-        states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], SAMPLES))])
+        states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], SAMPLES))])[:, :n]
         extent, magnitude = np.ptp(states, axis=0), np.abs(states).max(axis=0)
         at_rest, carried = extent <= ROUNDING_OF_GAP * EPSILON * magnitude, None
         if np.any(at_rest) and code == StatusCode.SUCCESS and len(arc.jumps) <= MOST_JUMPS_LOOKED_AT:
@@ -90,30 +98,30 @@ class Shooting:
         return Shot(
             point,
             mode,
-            trajectory.x,
+            trajectory.x[:n],
             trajectory.mode,
             trajectory.tangent_matrix,
             field,
-            trajectory.field(),
+            trajectory.field()[:n],
             extent,
             magnitude,
             status_of(trajectory, code),
             carried,
             trajectory.beyond,
             None if self.held is None else self.held.departure(point.t, point.x, magnitude),
-            self.system.turn_lengths,
+            self.system.turn_lengths[:n],
         )
 
     def _trajectory(self, point: Point, mode: str | None) -> Trajectory:
         """A run from a point that carries the columns of the identity."""
         return start(
             self.system,
-            point.x,
+            self.whole(point),
             point.t,
             mode=mode,
             parameters=self.parameters,
             solver=self.solver,
-            tangent=np.eye(self.system.dimension),
+            tangent=np.eye(self.system.tangent_dimension),
         )
 
     def newton(self, point: Point, free_period: bool, tolerance: float, max_iterations: int) -> PeriodicOrbit:
@@ -124,7 +132,8 @@ class Shooting:
         """
         shot = self.shoot(point)
         share = float(np.sqrt(self.solver.rtol))
-        held = held_by(self.system, self.system.parameter_values(self.parameters), shot, share)
+        values = self.system.parameter_values(self.parameters)
+        held = held_by(self.system, values, shot, share, self.counters)
         if held is not None and free_period:
             return attrs.evolve(self, held=held)._search(shot, True, tolerance, max_iterations)
         found = self._search(shot, free_period, tolerance, max_iterations)
@@ -211,7 +220,7 @@ class Shooting:
         """The orbit, with a remedy for a search that failed since a component counts turns."""
         if orbit.status.code != StatusCode.NOT_CONVERGED:
             return orbit
-        moved = self._follow(guess, guess.period, self.mode).x[-1] - guess.x
+        moved = self._follow(guess, guess.period, self.mode).x[-1] - self.whole(guess)
         for i in np.flatnonzero(np.abs(moved) > 0.5 * TURN).tolist():
             if self.system.turn_lengths[i] == 0.0 and self._is_same_after_a_turn(i, guess):
                 name = self.system.state_names[i]
@@ -228,7 +237,7 @@ class Shooting:
         system, values = self.system, self.system.parameter_values(self.parameters)
         lengths = TURN * (np.arange(system.dimension) == i)
         return all(
-            angle_fault_at(system.variables, function, guess.t, guess.x, values, lengths) is None
+            angle_fault_at(system.variables, function, guess.t, self.whole(guess), values, lengths) is None
             for _, function in functions_of(system)
         )
 
@@ -245,8 +254,9 @@ class Shooting:
 
     def _moved(self, guess: Point, shift: float) -> tuple[Shooting, Point]:
         arc = self._follow(guess, shift, self.mode)
-        shooting = attrs.evolve(self, mode=str(arc.mode[-1]))
-        moved = Point(arc.x[-1], guess.t + shift, guess.period)
+        state, counters = np.split(arc.x[-1], [self.system.tangent_dimension])
+        shooting = attrs.evolve(self, mode=str(arc.mode[-1]), counters=counters)
+        moved = Point(state, guess.t + shift, guess.period)
         return shooting, attrs.evolve(moved, period=shooting._time_of_return(moved))
 
     def _time_of_return(self, guess: Point) -> float:
@@ -258,8 +268,9 @@ class Shooting:
         times = guess.period * (1 + PERIOD_OFF * np.linspace(-1, 1, 2 * SAMPLES - 1))
         if not arc.status.ok:
             return guess.period
-        extent = np.ptp(arc.x, axis=0)
-        apart = [closed_change(each, self.system.turn_lengths) for each in arc(guess.t + times) - guess.x]
+        n = self.system.tangent_dimension
+        extent, lengths = np.ptp(arc.x[:, :n], axis=0), self.system.turn_lengths[:n]
+        apart = [closed_change(each, lengths) for each in arc(guess.t + times)[:, :n] - guess.x]
         gaps = np.linalg.norm(apart / np.where(extent > 0, extent, 1.0), axis=1)
         nearest = int(np.argmin(gaps))
         return float(times[nearest]) if gaps[nearest] < NEARER * gaps[SAMPLES - 1] else guess.period
@@ -267,9 +278,10 @@ class Shooting:
     def _nearest(self, orbit: PeriodicOrbit, guess: Point) -> PeriodicOrbit:
         """The same orbit from the point of its arc, away from jumps, that is nearest to the guess."""
         arc = orbit.arc(self.solver)
-        extent = np.ptp(arc.x, axis=0)
+        states = arc.x[:, : self.system.tangent_dimension]
+        extent = np.ptp(states, axis=0)
         # Distances in units of the orbit, so that those of the states do not matter.
-        apart = (arc.x - guess.x) / np.where(extent > 0, extent, 1.0)
+        apart = (states - guess.x) / np.where(extent > 0, extent, 1.0)
         times = arc.jumps.t
         # On a jump, rounding would decide whether a run from the point makes it.
         away = [np.all(np.abs(times - t) > POINT_ERROR * orbit.period) for t in arc.t]
@@ -284,7 +296,7 @@ class Shooting:
         return PeriodicOrbit(
             system=self.system,
             parameters=self._all_parameters(),
-            x0=shot.point.x,
+            x0=self.whole(shot.point),
             mode=shot.mode,
             t0=shot.point.t,
             period=float(shot.point.period),
@@ -334,7 +346,7 @@ class Shooting:
         """The arc from a point over a time, without tangent vectors."""
         return simulate(
             self.system,
-            point.x,
+            self.whole(point),
             (point.t, point.t + span),
             mode=mode,
             parameters=self.parameters,

@@ -71,7 +71,7 @@ class Triangles:
         run, basis = self.trajectory, self.basis
         t, x, mode = run.t, run.x, run.mode
         end = self.begin + (self.done + 1) * self.interval
-        factors = fundamental_factors(run, end, np.ones(len(x)))
+        factors = fundamental_factors(run, end, np.ones(len(basis)))
         self.code = factors.code
         if factors.code != codes.DONE:
             return None

@@ -16,7 +16,7 @@ from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.tables import counted, html_table
 from hybrid.errors import ArgumentError
 from hybrid.simulation.jumps import Grazing, Jumps, Sensitivities, known
-from hybrid.simulation.labelled import Names, attributes
+from hybrid.simulation.labelled import Names, attributes, with_counters
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
 
@@ -221,9 +221,7 @@ class HybridArc:
             "mode": ("t", self.mode),
         }
         if self.fundamental is not None:
-            # Counters have no derivatives.
-            rows = np.full((self.system.dimension, self.fundamental.shape[1]), np.nan)
-            rows[: len(self.fundamental)] = self.fundamental
+            rows = with_counters(self.fundamental, self.system.dimension)
             variables["fundamental"] = (("state", "tangent"), rows)
         coords = {"t": ("t", self.t, names.of("t")), **names.coords()}
         made_by = attributes("arc", self.status, self.system, self.parameters)

@@ -49,7 +49,7 @@ class _Start:
             return False
         n, modes = self.system.dimension, self.system.modes
         before, after = (
-            field_function(modes[self.system.mode_index(name)], n)
+            field_function(modes[self.system.mode_index(name)], self.system.variables)
             for name in (transition.source, transition.target)
         )
         guard = guard_function(transition)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import attrs
+import numpy as np
 
 from hybrid.display.tables import with_unit
 from hybrid.status import Status
@@ -47,6 +48,13 @@ class Names:
     def rate(self) -> dict[str, str]:
         """Attributes of a value per unit of time, such as an exponent."""
         return {"units": f"1/{self.units['t']}"} if "t" in self.units else {}
+
+
+def with_counters(rows: np.ndarray, n: int) -> np.ndarray:
+    """Tangent vectors ``(..., k, m)`` with ``n`` rows: nan for counters, which come last and have none."""
+    whole = np.full((*rows.shape[:-2], n, rows.shape[-1]), np.nan)
+    whole[..., : rows.shape[-2], :] = rows
+    return whole
 
 
 def attributes(

@@ -121,7 +121,7 @@ def simulate_many(
 
 def _origins(system: HybridSystem, x0: Any) -> np.ndarray:
     names = system.state_names
-    by_name = system.variables.components("x0", x0)
+    by_name = system.variables.by_component("x0", x0)
     if by_name is not None:
         columns = [arguments.numbers(f"x0[{name!r}]", by_name[name], STARTS) for name in names]
         try:

@@ -18,6 +18,7 @@ from hybrid.orbits.continuation.route import LARGEST_GROWTH, Loop, Stretch, rout
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver
+from hybrid.system.graph import refuse_counters
 
 # A step may turn by this angle (its cosine).
 LEAST_COSINE = 0.95
@@ -232,8 +233,9 @@ def place_on(orbit: Any, names: tuple[str, ...], sizes: np.ndarray, solver: Solv
     Raises
     ------
     ArgumentError
-        If the orbit is not found again.
+        If the orbit is not found again, or its system has counters.
     """
+    refuse_counters(orbit.system, "Continuation")
     family = Family(orbit.system, names, dict(orbit.parameters), orbit.forcing_periods, solver, ())
     arc, values = orbit.arc(solver), np.array([orbit.parameters[name] for name in names])
     started = start_of(family, arc, orbit.period, values) if arc.status.ok else None

@@ -19,7 +19,7 @@ from hybrid.simulation.plan import check_solver
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.elements import Guard
-from hybrid.system.graph import HybridSystem, as_system, check_mode
+from hybrid.system.graph import HybridSystem, as_system, check_mode, refuse_counters
 from hybrid.system.labels import named
 from hybrid.transform.markers import with_section
 
@@ -103,6 +103,7 @@ def setup_of(system: HybridSystem, first: np.ndarray, given: Mapping[str, Any]) 
     that are fields of a setup.
     """
     as_system("system", system)
+    refuse_counters(system, "The search for attractors")
     overrides = named("parameters", given["parameters"])
     system.parameter_values(overrides)
     mode, section, interval = given["mode"], given["section"], given["interval"]

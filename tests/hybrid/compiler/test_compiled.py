@@ -104,7 +104,7 @@ def test_derivatives_have_one_column_per_state_and_one_for_time():
     """The field ``(v, -g)`` and the guard ``q`` of a ball do not change with time."""
     ball, values = compile_system(bouncing_ball()), bouncing_ball().parameter_values()
     x = np.array([1.0, 2.0])
-    field = field_function(ball.system.modes[0], 2)
+    field = field_function(ball.system.modes[0], ball.system.variables)
     assert ball.derivative(field, 0, 0.0, x, values).tolist() == [[0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]
     guard = guard_function(ball.system.transitions[0])
     assert ball.derivative(guard, 0, 0.0, x, values).tolist() == [[1.0, 0.0, 0.0]]

@@ -166,13 +166,13 @@ def test_every_function_agrees_with_the_model(model, compiled):
     n, p = system.dimension, system.parameter_values()
     functions = load(emit(system), compiled=compiled)
     pairs = [
-        ("field", "field_jacobian", k, field_function(mode, system.dimension))
+        ("field", "field_jacobian", k, field_function(mode, system.variables))
         for k, mode in enumerate(system.modes)
     ]
     for k, transition in enumerate(system.transitions):
         pairs.append(("guard", "guard_gradient", k, guard_function(transition)))
         if transition.reset is not None:
-            pairs.append(("reset", "reset_jacobian", k, reset_function(transition, system.state)))
+            pairs.append(("reset", "reset_jacobian", k, reset_function(transition, system.variables)))
     for value, derivative, index, function in pairs:
         for t, x in sample_points(n):
             expected = plain(system, function.value, t, x)

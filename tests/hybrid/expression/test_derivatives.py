@@ -123,7 +123,7 @@ def test_matrices_of_zeros():
         ],
     )
     compiled, x = compile_system(system), np.linspace(0.5, 1.5, n)
-    field = compiled.derivative(field_function(system.modes[0], system.state), 0, 0.3, x, np.zeros(0))
+    field = compiled.derivative(field_function(system.modes[0], system.variables), 0, 0.3, x, np.zeros(0))
     expected = -np.eye(n, n + 1)
     for i in range(0, n, 5):
         expected[i] = 0.0
@@ -131,7 +131,7 @@ def test_matrices_of_zeros():
         expected[i, 0] += x[i]
         expected[i, n] = -1.0
     np.testing.assert_allclose(field, expected, atol=1e-15)
-    reset = compiled.derivative(reset_function(system.transitions[0], system.state), 0, 0.3, x, np.zeros(0))
+    reset = compiled.derivative(reset_function(system.transitions[0], system.variables), 0, 0.3, x, np.zeros(0))
     np.testing.assert_array_equal(reset, np.diag([0.5] + [1.0] * (n - 1) + [0.0])[:n])
 
 
@@ -141,7 +141,7 @@ def test_a_power_of_zero_has_slope_zero_in_its_exponent():
         parameters={"k": 0.0},
         modes=[Mode("a", lambda t, x, p: (np.abs(x.q) ** x.v, p.k**x.v + 2.0**t))],
     )
-    compiled, function = compile_system(flow), field_function(flow.modes[0], 2)
+    compiled, function = compile_system(flow), field_function(flow.modes[0], flow.variables)
     found = compiled.derivative(function, 0, 3.0, np.array([0.0, 1.5]), flow.parameter_values())
     np.testing.assert_allclose(found, [[0.0, 0.0, 0.0], [0.0, 0.0, 8.0 * np.log(2.0)]], rtol=1e-14)
 

@@ -92,7 +92,7 @@ def test_a_wrong_derivative_is_found_in_any_units_of_the_rates(unit):
         oscillator(lambda t, x, p: ((0, unit), (unit * np.sign(x.q - 1.0), 0)), field=bent)
     for field, smooth_there in ((smooth, True), (bent, False)):
         system = oscillator(field=field)
-        error = complex_step_error(system.variables, field_function(system.modes[0], 2))
+        error = complex_step_error(system.variables, field_function(system.modes[0], system.variables))
         assert (error is None) is smooth_there
 
 
@@ -157,7 +157,7 @@ def test_points_without_a_value_are_passed_over():
 def test_whether_the_complex_step_can_be_taken(field, runs):
     system = oscillator(field=field)
     assert (
-        complex_step_error(system.variables, field_function(system.modes[0], system.dimension)) is None
+        complex_step_error(system.variables, field_function(system.modes[0], system.variables)) is None
     ) is runs
 
 
@@ -168,12 +168,12 @@ def test_storing_a_complex_number_in_a_real_array_is_not_overlooked():
         return rate
 
     system = HybridSystem(state=2, modes=[Mode("a", field)])
-    assert complex_step_error(system.variables, field_function(system.modes[0], system.dimension)) is not None
+    assert complex_step_error(system.variables, field_function(system.modes[0], system.variables)) is not None
 
 
 def test_a_branch_on_an_array_entry_is_not_overlooked():
     system = HybridSystem(state=1, modes=[Mode("a", lambda t, x, p: x if x[0] > 0 else -x)])
-    assert complex_step_error(system.variables, field_function(system.modes[0], system.dimension)) is not None
+    assert complex_step_error(system.variables, field_function(system.modes[0], system.variables)) is not None
 
 
 class TestReference:
@@ -183,7 +183,7 @@ class TestReference:
 
     def at(self, second, method=reference_derivative, slow=1.0):
         system = HybridSystem(state=("q", "v"), modes=[Mode("a", lambda t, x, p: (x.v * slow, second(t, x)))])
-        function = field_function(system.modes[0], 2)
+        function = field_function(system.modes[0], system.variables)
         return method(system.variables, function, self.t, self.x, system.parameter_values())
 
     @pytest.mark.parametrize("method", [reference_derivative, _central_difference])

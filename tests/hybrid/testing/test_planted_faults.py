@@ -117,7 +117,7 @@ class Saltation(Engine):
         p = system.variables.parameter_view(values)
         before = system.variables.state_view(x)
         if edge.reset is not None:
-            reset = self.derivative(system, reset_function(edge, system.state), index, t, x, values)
+            reset = self.derivative(system, reset_function(edge, system.variables), index, t, x, values)
             x_plus = edge.reset.function(t, before, p)
         f_minus = np.array(system.modes[system.mode_index(edge.source)].field(t, before, p), dtype=float)
         after = system.variables.state_view(x_plus)

@@ -331,7 +331,7 @@ class TestModel:
             lambda t, x, p: x.x * x.y - np.cos(p.k * t) * np.sqrt(1 + x.z**2),
         )
         compiled = hybrid.compile_system(system)
-        sliding = field_function(system.modes[2], system.dimension)
+        sliding = field_function(system.modes[2], system.variables)
         rng = np.random.default_rng(3)
         for _ in range(5):
             t, x = rng.uniform(0, 3), rng.uniform(0.5, 1.5, 3)
