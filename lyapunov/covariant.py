@@ -84,7 +84,10 @@ class CovariantVectors:
 
         return xarray.Dataset(
             {
-                "vectors": (("sample", "state", "exponent"), with_counters(self.vectors, len(self.names.state))),
+                "vectors": (
+                    ("sample", "state", "exponent"),
+                    with_counters(self.vectors, len(self.names.state)),
+                ),
                 "exponents": ("exponent", self.exponents, self.names.rate),
                 "standard_error": ("exponent", self.standard_error, self.names.rate),
                 "growths": (("sample", "exponent"), self.growths, self.names.rate),

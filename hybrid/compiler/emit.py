@@ -365,7 +365,9 @@ class _Writer:
                 return name
         check_plain(title, called)
         name, names, why = f"model_{len(self.opaque)}", tuple(self.system.parameters), str(reason).rstrip(".")
-        opaque = OpaqueFunction(title, called, why, self.system.variables.components, names, shape, completed=completed)
+        opaque = OpaqueFunction(
+            title, called, why, self.system.variables.components, names, shape, completed=completed
+        )
         self.opaque[name] = opaque
         return name
 

@@ -104,7 +104,7 @@ class Variables:
             )
         kinds = {
             "a state": self.state_names[: self.moving],
-            "held": self.held,
+            "a held component": self.held,
             "a counter": self.counters,
             "a parameter": self.parameters,
         }

@@ -16,8 +16,8 @@ from hybrid.simulation.jumps import Jump
 from hybrid.solvers import DOP853, Solver
 from hybrid.status import StatusCode
 from hybrid.system.derivatives import evaluate
-from hybrid.system.elements import Mode, Transition
-from hybrid.system.functions import ModelFunction, reset_function
+from hybrid.system.elements import Function, Mode, Transition
+from hybrid.system.functions import ModelFunction, field_function, reset_function
 from hybrid.system.graph import HybridSystem, laws_of
 from hybrid.system.laws import Laws
 from hybrid.system.variables import named_values
@@ -173,7 +173,7 @@ class Case:
 
     def field(self, mode: str, t: float, x: Any) -> np.ndarray:
         """The vector field ``(n,)`` of a mode at ``(t, x)``, with the parameters of this case."""
-        return self.evaluate(self.mode_of(mode).field, t, x)
+        return self.evaluate(self.rates_of(mode), t, x)
 
     def law(self, name: str, t: float, x: Any) -> float:
         """The quantity of a law of states, such as an energy, at ``(t, x)``.
@@ -189,6 +189,10 @@ class Case:
     def mode_of(self, name: str) -> Mode:
         """The mode of that name."""
         return self.system.modes[self.system.mode_index(name)]
+
+    def rates_of(self, name: str) -> Function:
+        """The field of the mode of that name, with the rate 0 of what is held or counts."""
+        return field_function(self.mode_of(name), self.system.variables).value
 
     @cached_property
     def values(self) -> np.ndarray:

@@ -15,6 +15,7 @@ from hybrid.status import StatusCode
 from hybrid.system.clocks import Clock
 from hybrid.system.derivatives import evaluate
 from hybrid.system.elements import Function, Guard, Mode, Transition
+from hybrid.system.functions import field_function
 from hybrid.system.graph import HybridSystem
 from hybrid.system.watched import is_of_library
 from hybrid.testing.case import MOST_OF_WHOLE, Case, lasting
@@ -130,7 +131,7 @@ class Coverage:
     def _moves(self, mode: Mode) -> bool:
         variables = self.system.variables
         places = ((case.t0, np.array(case.x0), case.values) for case in self.cases)
-        found = (evaluate(variables, mode.field, *place) for place in places)
+        found = (evaluate(variables, field_function(mode, variables).value, *place) for place in places)
         return any(rates is not None and rates.any() for rates in found)
 
     def aimed(self) -> Iterator[Case]:
@@ -210,7 +211,11 @@ class Coverage:
         """Whether a condition reads a component that no field moves: drawn values say nothing of it."""
         system = self.system
         places = [(case.t0, np.array(case.x0), case.values) for case in self.cases]
-        rates = [evaluate(system.variables, mode.field, *place) for mode in system.modes for place in places]
+        rates = [
+            evaluate(system.variables, field_function(mode, system.variables).value, *place)
+            for mode in system.modes
+            for place in places
+        ]
         moved = np.any([each != 0.0 for each in rates if each is not None], axis=0)
         try:
             read = names_read(system, condition)
@@ -245,7 +250,7 @@ def _side(case: Case, guard: Guard | Clock, t: float, x: np.ndarray) -> list[flo
 def _ways(transition: Transition, case: Case, t: float, x: np.ndarray) -> list[float]:
     """The sign of a guard after a place on it, in the mode that it ends; nothing if it is not crossed."""
     guard = transition.guard
-    rates = evaluate(case.system.variables, case.mode_of(transition.source).field, t, x, case.values)
+    rates = evaluate(case.system.variables, case.rates_of(transition.source), t, x, case.values)
     if rates is None:
         return []
     moment = 1e-6 * (case.t1 - case.t0)
@@ -266,7 +271,7 @@ def _just_before(transition: Transition, case: Case, t: float, x: np.ndarray) ->
     if _answers(transition, case, t, x) != [True]:
         return None
     moment = MOMENT * (case.t1 - case.t0)
-    rates = evaluate(case.system.variables, case.mode_of(transition.source).field, t, x, case.values)
+    rates = evaluate(case.system.variables, case.rates_of(transition.source), t, x, case.values)
     before = tuple((x - moment * rates).tolist())
     aimed = attrs.evolve(case, mode=None, x0=before, t0=t - moment, t1=t - moment + case.t1 - case.t0)
     start = start_in(aimed, transition.source)

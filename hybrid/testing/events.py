@@ -79,7 +79,7 @@ def check_jumps(case: Case) -> None:
 def _guard_jumps(case: Case, jump: Jump) -> bool:
     """Whether a guard is discontinuous at an event: its signs just before and just after differ."""
     transition = case.transition(jump)
-    field = case.evaluate(case.mode_of(jump.source).field, jump.t, jump.x_minus)
+    field = case.evaluate(case.rates_of(jump.source), jump.t, jump.x_minus)
     moment = 1e-9 * case.duration
     before, after = (
         float(case.evaluate(transition.guard.function, jump.t + shift, jump.x_minus + shift * field)[0])

@@ -56,7 +56,7 @@ def check_cut(case: Case) -> None:
     j = int(case.fraction * (len(times) - 1))
     t = times[j] + case.fraction * (times[j + 1] - times[j])
     x, mode = run.arc(t), _mode_after(case, j)
-    speed = case.evaluate(case.mode_of(mode).field, t, x) / run.scale
+    speed = case.evaluate(case.rates_of(mode), t, x) / run.scale
     if not np.linalg.norm(speed) * case.duration > ROUNDING:
         discard("the state is at rest where the run would be cut")
     normal = speed / np.linalg.norm(speed) / run.scale

@@ -110,7 +110,7 @@ def check_limits(case: Case) -> None:
 
 def _check_stays(case: Case, jump: Jump, arc: HybridArc) -> None:
     """Fail if the mode of a limit moves the guard of the chatter, or its speed in the mode that chatters."""
-    guard, field = case.transition(jump).guard.function, case.mode_of(jump.source).field
+    guard, field = case.transition(jump).guard.function, case.rates_of(jump.source)
     moment = MOMENT * (case.t1 - case.t0)
 
     def value_and_speed(t: float, x: np.ndarray) -> tuple[float, float]:

@@ -230,12 +230,11 @@ def _check_across(case: Case, law: Law) -> None:
 
 def _check_continuous(case: Case, name: str, told: str) -> None:
     """Fail if the state or the field jumps at a transition."""
-    arc, modes = whole_run(case), case.system.modes
+    arc = whole_run(case)
     for jump in _jumps_of(case, name):
         assert jump.target is not None
-        before, after = (modes[case.system.mode_index(mode)] for mode in (jump.source, jump.target))
-        (fields, sizes) = sized(case, before.field, jump.t, jump.x_minus, arc)
-        (others, more) = sized(case, after.field, jump.t, jump.x_plus, arc)
+        (fields, sizes) = sized(case, case.rates_of(jump.source), jump.t, jump.x_minus, arc)
+        (others, more) = sized(case, case.rates_of(jump.target), jump.t, jump.x_plus, arc)
         pairs = {
             "the state": (jump.x_minus, jump.x_plus, np.abs(arc.x).max(axis=0)),
             "the field": (fields, others, sizes + more),

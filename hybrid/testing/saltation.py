@@ -120,7 +120,7 @@ def check_extension(case: Case) -> None:
         jump.x_minus,
         {**case.parameters, **variant.extension(added)},
     )
-    field = case.evaluate(case.mode_of(jump.source).field, jump.t, jump.x_minus)
+    field = case.evaluate(case.rates_of(jump.source), jump.t, jump.x_minus)
     # Terms of this size cancel.
     terms = np.abs(wanted) + np.abs(np.outer(added, slope)) * (
         1.0 + np.abs(slope) @ np.abs(field) / abs(jump.transversality)
@@ -399,14 +399,12 @@ def _terms(case: Case, jump: Jump) -> np.ndarray:
         mode = case.mode_of(name)
         slope = np.abs(case.slope(field_function(mode, case.system.variables), name, jump.t, x))
         sizes += slope[:, :-1] @ case.run.scale + slope[:, -1] * case.duration
-        sizes += np.abs(case.evaluate(mode.field, jump.t, x))
+        sizes += np.abs(case.evaluate(case.rates_of(mode.name), jump.t, x))
     return sizes
 
 
 def _fields(case: Case, jump: Jump) -> tuple[np.ndarray, np.ndarray]:
-    modes = case.system.modes
-    source, target = (case.system.mode_index(name) for name in (jump.source, mode_after(jump)))
     return (
-        case.evaluate(modes[source].field, jump.t, jump.x_minus),
-        case.evaluate(modes[target].field, jump.t, jump.x_plus),
+        case.evaluate(case.rates_of(jump.source), jump.t, jump.x_minus),
+        case.evaluate(case.rates_of(mode_after(jump)), jump.t, jump.x_plus),
     )

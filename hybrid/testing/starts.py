@@ -26,10 +26,7 @@ def start_in(case: Case, mode: str) -> tuple[float, ...] | None:
     names = case.names_of_mode(mode)
     functions = [law.function for law in case.laws.equal if law.holds_in(*names)]
     x = nearest_zero(case, functions, case.t0, np.array(case.x0, dtype=float))
-    if (
-        x is None
-        or evaluate(case.system.variables, case.mode_of(mode).field, case.t0, x, case.values) is None
-    ):
+    if x is None or evaluate(case.system.variables, case.rates_of(mode), case.t0, x, case.values) is None:
         return None
     walls = (each for each in case.system.transitions if each.source == mode)
     if not all(guard_beyond(case, each, case.t0, x) < 0.0 for each in walls):

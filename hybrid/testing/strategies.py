@@ -16,6 +16,7 @@ from hybrid.errors import ArgumentError
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import Solver
 from hybrid.system.derivatives import evaluate
+from hybrid.system.functions import field_function
 from hybrid.system.graph import HybridSystem, as_system, check_mode, laws_of
 from hybrid.system.labels import named
 from hybrid.system.laws import Laws
@@ -249,7 +250,7 @@ def default_duration(system: HybridSystem, values: Mapping[str, float]) -> float
     times: list[float] = []
     for mode in system.modes:
         for x in rng.uniform(-2.0, 2.0, (8, system.dimension)):
-            f = evaluate(system.variables, mode.field, 0.0, x, vector)
+            f = evaluate(system.variables, field_function(mode, system.variables).value, 0.0, x, vector)
             if f is not None:
                 times += [2.0 / abs(rate) for rate in f if rate != 0.0]
     return 10.0 * float(np.median(times)) if times else 10.0

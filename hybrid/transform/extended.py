@@ -22,11 +22,12 @@ _EXTENDED: WeakKeyDictionary[HybridSystem, dict[tuple[str, ...], HybridSystem]] 
 
 
 def extended(system: HybridSystem, names: tuple[str, ...]) -> HybridSystem:
-    """The system with these parameters as held components, the last ones, that every reset leaves as they are.
+    """The system with these parameters as held components, which every reset leaves as they are.
 
-    In a state without names they are components at its end whose rates are 0. A tangent vector along such a component is the derivative of the flow in the parameter, and a guard that
-    moves with the parameter has a gradient there, so that the saltation matrix moves the event. If the period
-    depends on one of the parameters the system has none: time is a plain number.
+    They come last of what has tangent vectors; in a state without names they are components at its end whose
+    rates are 0. A tangent vector along such a component is the derivative of the flow in the parameter, and a
+    guard that moves with the parameter has a gradient there, so that the saltation matrix moves the event. If
+    the period depends on one of the parameters the system has none: time is a plain number.
     """
     made = _EXTENDED.setdefault(system, {})
     if names not in made:
@@ -35,10 +36,7 @@ def extended(system: HybridSystem, names: tuple[str, ...]) -> HybridSystem:
 
 
 def with_parameters(system: HybridSystem, x: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """A state of an extended system: that of the original, and behind what has tangent vectors the parameters.
-
-    ``x`` may also be such a state, with other values.
-    """
+    """A state of an extended system with these parameters, from one of the original or of itself."""
     m = len(values)
     last = system.tangent_dimension
     counters = system.dimension - last

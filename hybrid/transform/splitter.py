@@ -230,7 +230,9 @@ class Splitter:
         if transition.clock is not None:
             return None
         try:
-            [guard] = trace(transition.guard.function, self.variables.components, self.variables.parameter_names)
+            [guard] = trace(
+                transition.guard.function, self.variables.components, self.variables.parameter_names
+            )
         except TraceError:
             return None
         return guard

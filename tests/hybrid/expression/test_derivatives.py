@@ -131,7 +131,9 @@ def test_matrices_of_zeros():
         expected[i, 0] += x[i]
         expected[i, n] = -1.0
     np.testing.assert_allclose(field, expected, atol=1e-15)
-    reset = compiled.derivative(reset_function(system.transitions[0], system.variables), 0, 0.3, x, np.zeros(0))
+    reset = compiled.derivative(
+        reset_function(system.transitions[0], system.variables), 0, 0.3, x, np.zeros(0)
+    )
     np.testing.assert_array_equal(reset, np.diag([0.5] + [1.0] * (n - 1) + [0.0])[:n])
 
 
