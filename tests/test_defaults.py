@@ -38,6 +38,8 @@ DEFAULTS = {
     hybrid.Reset: {"jacobian": None},
     hybrid.Transition: {"reset": None, "accumulates_to": None, "part_of": None},
     hybrid.HybridSystem: {
+        "held": (),
+        "counters": (),
         "transitions": (),
         "start": None,
         "period": None,

@@ -101,6 +101,8 @@ def systems():
                     {3: 1.0},
                     {"e": 1j},
                 ],
+                "held": MEMORY,
+                "counters": MEMORY,
                 "modes": [*LIST, [], [1], ["a"]],
                 "transitions": [*LIST, [1], ["a"]],
                 "start": NAME,
