@@ -154,6 +154,7 @@ def _estimated(
     arc = run(solver, x0, mode)
     rungs = [solver.tightened(factor) for factor in TIGHTER]
     aside = ROUNDING * EPSILON * np.sqrt(1 + arc.steps) * np.abs(arc.x).max(axis=0)
+    aside[system.tangent_dimension :] = 0.0
     # Two directions, so that no component has a difference of zero in both runs.
     signs = np.ones(system.dimension), (-1.0) ** np.arange(system.dimension)
     begin = str(arc.mode[0])

@@ -79,9 +79,9 @@ def check_cut(case: Case) -> None:
     if not cuts:
         case.fail(CUT, f"the cut at t = {t:.10g} was never crossed", hint="the solver misses events.")
     for cut in cuts:
-        if not np.all(
-            np.abs(cut.saltation - np.eye(len(normal))) * run.scale / run.scale[:, None] <= ROUNDING
-        ):
+        k = len(cut.saltation)
+        scale = run.scale[:k]
+        if not np.all(np.abs(cut.saltation - np.eye(k)) * scale / scale[:, None] <= ROUNDING):
             case.fail(
                 CUT,
                 f"wanted the identity as saltation matrix at the cut, t = {cut.t:.10g}",

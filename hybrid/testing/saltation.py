@@ -106,7 +106,8 @@ def check_extension(case: Case) -> None:
     if variant.resets_stay:
         discard("a model function cannot be traced, so it cannot be changed")
     slope = _guard_slope(case, jump)
-    x_scale = case.run.scale
+    k = case.system.tangent_dimension
+    x_scale = case.run.scale[:k]
     size = np.sum(np.abs(slope) * x_scale)
     if not size > 0.0:
         discard("the guard does not depend on the state")
@@ -118,9 +119,9 @@ def check_extension(case: Case) -> None:
         jump.transition,
         jump.t,
         jump.x_minus,
-        {**case.parameters, **variant.extension(added)},
+        {**case.parameters, **variant.extension(np.append(added, np.zeros(case.system.dimension - k)))},
     )
-    field = case.evaluate(case.rates_of(jump.source), jump.t, jump.x_minus)
+    field = case.evaluate(case.rates_of(jump.source), jump.t, jump.x_minus)[:k]
     # Terms of this size cancel.
     terms = np.abs(wanted) + np.abs(np.outer(added, slope)) * (
         1.0 + np.abs(slope) @ np.abs(field) / abs(jump.transversality)
@@ -246,7 +247,8 @@ def check_sum_rule(case: Case) -> None:
     assert arc.fundamental is not None
     if not arc.status.ok:
         discard(str(arc.status))
-    sizes = np.linalg.svd(arc.fundamental / run.scale[:, None] * run.scale, compute_uv=False)
+    scale = run.scale[: case.system.tangent_dimension]
+    sizes = np.linalg.svd(arc.fundamental / scale[:, None] * scale, compute_uv=False)
     if not sizes[-1] > 1e-6 * sizes[0] or not np.all(np.abs(determinants) > 1e-9):
         discard("a direction is lost, or nearly so, along the run")
     jumps, flow, size = float(np.sum(np.log(np.abs(determinants)))), *_divergence(case)
@@ -288,6 +290,7 @@ class _Window:
         self.case, self.run = case, case.run
         self.jumps = [other for other in self.run.arc.jumps if other.t == jump.t]
         self.jump, self.last = self.jumps[0], self.jumps[-1]
+        self.scale = self.run.scale[: case.system.tangent_dimension]
         times = np.array([case.t0, *self.run.arc.jumps.t, self.run.t1])
         before, after = jump.t - times[self.jump.j], times[self.last.j + 2] - jump.t
         if not min(before, after) > 1e-6 * case.duration:
@@ -296,7 +299,7 @@ class _Window:
             np.abs(_field_slope(case, mode, jump.t, x))
             for mode, x in ((self.jump.source, self.jump.x_minus), (mode_after(self.last), self.last.x_plus))
         ]
-        scale = self.run.scale
+        scale = self.scale
         fastest = max(float(np.max(np.sum(rate * scale / scale[:, None], axis=1))) for rate in rates)
         longest = min(0.5 * before, 0.5 * after)
         self.width = min(longest, 0.2 / fastest) if fastest > 0 else longest
@@ -305,7 +308,7 @@ class _Window:
 
     def differences(self) -> tuple[np.ndarray, np.ndarray]:
         """Derivative of the end state by the start state, and the tolerance of its scaled form."""
-        scale, jump = self.run.scale, self.jump
+        scale, jump = self.scale, self.jump
         slope = np.abs(_guard_slope(self.case, jump))
         # The displaced runs must also cross the guard inside the window.
         shift = slope * scale / abs(jump.transversality)
@@ -323,7 +326,7 @@ class _Window:
 
     def _central(self, step: float) -> np.ndarray:
         columns = []
-        for i, h in enumerate(step * self.run.scale):
+        for i, h in enumerate(step * self.scale):
             displacement = np.zeros_like(self.start)
             displacement[i] = h
             columns.append(
@@ -337,7 +340,7 @@ class _Window:
             jump.transition for jump in self.jumps
         ]:
             discard("a displaced run has other events")
-        return np.asarray(arc.x[-1])
+        return np.asarray(arc.x[-1, : len(self.scale)])
 
     def fundamental(self) -> np.ndarray:
         """Tangent map of a run across the event."""
@@ -351,7 +354,7 @@ class _Window:
         gap = 1e-6 * self.width
         before = case.simulate(jump.t - gap, start=(self.begin, self.start, jump.source), tangent=True)
         after = case.simulate(self.end, start=(last.t, last.x_plus, mode_after(last)), tangent=True)
-        rest = np.eye(len(self.start)) + gap * _field_slope(case, jump.source, jump.t, jump.x_minus)
+        rest = np.eye(len(self.scale)) + gap * _field_slope(case, jump.source, jump.t, jump.x_minus)
         assert before.fundamental is not None
         assert after.fundamental is not None
         return np.asarray(after.fundamental @ xi @ rest @ before.fundamental)
@@ -370,7 +373,7 @@ class _Window:
 
     def scaled(self, matrix: np.ndarray) -> np.ndarray:
         """A map between states, in units of the sizes of the components."""
-        return np.asarray(matrix * self.run.scale / self.run.scale[:, None])
+        return np.asarray(matrix * self.scale / self.scale[:, None])
 
 
 def _saltation(case: Case, jump: Jump) -> np.ndarray:
@@ -384,12 +387,13 @@ def _saltation(case: Case, jump: Jump) -> np.ndarray:
 
 def _guard_slope(case: Case, jump: Jump) -> np.ndarray:
     function = guard_function(case.transition(jump))
-    return case.slope(function, jump.transition, jump.t, jump.x_minus)[0, :-1]
+    return case.slope(function, jump.transition, jump.t, jump.x_minus)[0, : case.system.tangent_dimension]
 
 
 def _field_slope(case: Case, mode: str, t: float, x: np.ndarray) -> np.ndarray:
     function = field_function(case.mode_of(mode), case.system.variables)
-    return case.slope(function, mode, t, x)[:, :-1]
+    k = case.system.tangent_dimension
+    return case.slope(function, mode, t, x)[:k, :k]
 
 
 def _terms(case: Case, jump: Jump) -> np.ndarray:
@@ -400,11 +404,12 @@ def _terms(case: Case, jump: Jump) -> np.ndarray:
         slope = np.abs(case.slope(field_function(mode, case.system.variables), name, jump.t, x))
         sizes += slope[:, :-1] @ case.run.scale + slope[:, -1] * case.duration
         sizes += np.abs(case.evaluate(case.rates_of(mode.name), jump.t, x))
-    return sizes
+    return sizes[: case.system.tangent_dimension]
 
 
 def _fields(case: Case, jump: Jump) -> tuple[np.ndarray, np.ndarray]:
+    k = case.system.tangent_dimension
     return (
-        case.evaluate(case.rates_of(jump.source), jump.t, jump.x_minus),
-        case.evaluate(case.rates_of(mode_after(jump)), jump.t, jump.x_plus),
+        case.evaluate(case.rates_of(jump.source), jump.t, jump.x_minus)[:k],
+        case.evaluate(case.rates_of(mode_after(jump)), jump.t, jump.x_plus)[:k],
     )

@@ -50,7 +50,9 @@ def nearest_zero(case: Case, functions: list[Function], t: float, x: np.ndarray)
         residual, jacobian = (np.array(each) for each in zip(*pairs, strict=True))
         if np.all(np.abs(residual) <= ON_SURFACE * (np.abs(jacobian) @ np.abs(x))):
             return x
-        x = x - np.linalg.pinv(jacobian) @ residual
+        # A counter stays what it is.
+        free = case.system.tangent_dimension
+        x = x - np.append(np.linalg.pinv(jacobian[:, :free]) @ residual, np.zeros(len(x) - free))
         if not np.all(np.isfinite(x)):
             return None
     return x if np.all(np.abs(residual) <= NEAR_SURFACE * (np.abs(jacobian) @ np.abs(x))) else None

@@ -41,6 +41,9 @@ GRID = 500
 RANGES = "map names to ranges, or be a strategy"
 STARTS_TRIED = 8
 
+# Counters that a range does not give begin with numbers up to this.
+MOST_COUNTED = 10
+
 
 def states(
     system: HybridSystem, ranges: Ranges | SearchStrategy[Any] | None = None
@@ -82,7 +85,12 @@ def _states(name: str, system: HybridSystem, ranges: Any) -> SearchStrategy[tupl
     for each in chosen:
         arguments.known(f"{name}: State component", each, names, "State components")
     return st.tuples(
-        *(_values(f"{name}: Range of {each!r}", chosen.get(each, (-2.0, 2.0))) for each in names)
+        *(
+            st.integers(0, MOST_COUNTED).map(float)
+            if each in system.counters and each not in chosen
+            else _values(f"{name}: Range of {each!r}", chosen.get(each, (-2.0, 2.0)))
+            for each in names
+        )
     )
 
 

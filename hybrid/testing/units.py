@@ -7,6 +7,7 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import attrs
+import numpy as np
 
 from hybrid.compiler.compiled import compile_system
 from hybrid.solvers import Solver
@@ -98,7 +99,9 @@ def _compare_measured(case: Case, units: Mapping[str, float], time: float, solve
     variant = measured(case.system)
     end = time * case.run.t1
     assert case.mode is not None, "a case without a mode has no run"
-    start = time * case.t0, [units[case.mode] * value for value in case.x0], case.mode
+    k = case.system.tangent_dimension
+    own = [*(units[case.mode] * value for value in case.x0[:k]), *case.x0[k:]]
+    start = time * case.t0, own, case.mode
     extra = dict(zip(variant.state, (units[name] for name in case.system.mode_names), strict=True))
     arc = case.simulate(
         end,
@@ -110,7 +113,8 @@ def _compare_measured(case: Case, units: Mapping[str, float], time: float, solve
     last = str(arc.mode[-1])
     fired = [jump.transition for jump in arc.jumps]
     hint = f"a threshold that has a unit; {told}."
-    compare(case, UNITS, attrs.evolve(arc, x=arc.x / units[last]), fired, last, hint)
+    x = np.hstack([arc.x[:, :k] / units[last], arc.x[:, k:]])
+    compare(case, UNITS, attrs.evolve(arc, x=x), fired, last, hint)
 
 
 def _modes_of_limits(system: HybridSystem) -> set[str]:
@@ -123,7 +127,7 @@ def _measured(system: HybridSystem) -> Measured:
     names = tuple(system.parameters)
     units = {name: free_name(system, f"unit_of_state_{i}") for i, name in enumerate(system.mode_names)}
     time = free_name(system, "unit_of_time")
-    n = system.dimension
+    k = system.tangent_dimension
 
     def original(function: Callable[..., Any], mode: str) -> Callable[..., Any]:
         """A model function of the time and of the state in a mode in other units."""
@@ -133,7 +137,7 @@ def _measured(system: HybridSystem) -> Measured:
             if isinstance(system.state, int):
                 place = x / unit
             else:
-                place = named_values(STATE, system.state_names, [x[i] / unit for i in range(n)])
+                place = named_values(STATE, system.state_names, (*(each / unit for each in x[:k]), *x[k:]))
             return function(t / getattr(p, time), place, named_values(PARAMETERS, names, p[: len(names)]))
 
         return called
@@ -148,7 +152,13 @@ def _measured(system: HybridSystem) -> Measured:
             return None
         reset = (lambda t, x, p: x) if transition.reset is None else transition.reset.function
         values = original(WholeReset(reset, system.variables.components), source)
-        return Reset(lambda t, x, p: [value * getattr(p, units[target]) for value in values(t, x, p)])
+
+        def reset_in_units(t: Any, x: Any, p: Any) -> list[Any]:
+            found, unit = list(values(t, x, p)), getattr(p, units[target])
+            # A counter has no unit.
+            return [*(value * unit for value in found[:k]), *found[k:]]
+
+        return Reset(reset_in_units)
 
     def period(p: Any) -> Any:
         declared = system.period

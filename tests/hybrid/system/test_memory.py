@@ -27,7 +27,7 @@ TICKS = 8
 
 
 def sampled_loop(*, counters=("n",), forcing=0.0, period=None):
-    """x' = a x + b u with u := -k x at every T, by a guard on a clock state."""
+    """X' = a x + b u with u := -k x at every T, by a guard on a clock state."""
     control = {"c": lambda t, x, p: 0.0, "u": lambda t, x, p: -p.k * x.x, "n": lambda t, x, p: x.n + 1}
     written = ("c", "u", *counters)
     return HybridSystem(
@@ -211,7 +211,7 @@ def test_many_starts_by_name():
 
 
 @pytest.mark.parametrize(
-    "x0, text",
+    ("x0", "text"),
     [
         ({"x": 1.0, "c": 0.0, "n": 0.5}, "counter 'n' must be a whole number; got 0.5"),
         ((1.0, 0.0, 0.0, 1e-9), "counter 'n' must be a whole number"),
@@ -226,7 +226,7 @@ def test_refused_starts(x0, text):
 
 
 @pytest.mark.parametrize(
-    "changes, text",
+    ("changes", "text"),
     [
         ({"state": 2}, "held and counters are read by name"),
         ({"held": ("x",)}, "'x' is the name of a state and of a held component"),
@@ -243,7 +243,7 @@ def test_refused_models(changes, text):
 
 
 @pytest.mark.parametrize(
-    "reset, text",
+    ("reset", "text"),
     [
         (lambda t, x, p: {"n": 0.5 * x.n}, "gives counter 'n' the value"),
         (lambda t, x, p: {"n": x.x}, "gives counter 'n' the value"),
@@ -264,9 +264,7 @@ def test_given_derivatives_have_columns_for_all_components():
     given = attrs.evolve(
         loop,
         modes=[
-            attrs.evolve(
-                loop.modes[0], jacobian=lambda t, x, p: ((p.a, 0.0, p.b, 0.0), (0.0, 0.0, 0.0, 0.0))
-            )
+            attrs.evolve(loop.modes[0], jacobian=lambda t, x, p: ((p.a, 0.0, p.b, 0.0), (0.0, 0.0, 0.0, 0.0)))
         ],
         transitions=[
             attrs.evolve(
