@@ -70,7 +70,8 @@ def periodic_orbit(
     PeriodicOrbit
         It closes up to whole turns of the angles that the system declares, and counters go on counting. If
         Newton's method did not converge the status says how far it came. An equilibrium of a forced system
-        counts as an orbit, because it repeats after each forcing period; an equilibrium of an autonomous system does not.
+        counts as an orbit, because it repeats after each forcing period; an equilibrium of an autonomous
+        system does not.
 
     Raises
     ------

@@ -52,7 +52,8 @@ class Guard(Portable):
         -1 fires from positive to negative, +1 from negative to positive, 0 in both directions.
     gradient
         Optional ``(D_x g, D_t g)`` as a function of ``(t, x, p)`` that returns ``n + 1`` values, or
-        ``n`` if the guard does not depend on time. Derived from ``function`` if omitted.
+        ``n`` if the guard does not depend on time, with a column for every component of ``x``. Derived from
+        ``function`` if omitted.
     when
         Optional condition ``c(t, x, p)``, a scalar or a comparison: a crossing fires only if the condition
         is positive (or true) there, and is ignored otherwise. The condition is evaluated only at crossings,
@@ -110,9 +111,11 @@ class Reset(Portable):
     ----------
     function
         ``R(t, x, p)``, ``n`` values, or a dict of the components that change, such as ``{"v": -p.e * x.v}``.
+        It gives held components and counters too; a counter stays a whole number.
     jacobian
         Optional ``(t, x, p)`` function that returns the rows of ``D_x R``, each of ``n`` values, or of
-        ``n + 1`` with ``D_t R`` last. Derived from ``function`` if omitted.
+        ``n + 1`` with ``D_t R`` last. Derived from ``function`` if omitted. Rows and columns of counters are
+        not used.
 
     Raises
     ------
@@ -139,10 +142,12 @@ class Mode(Portable):
     name
         Name by which transitions refer to the mode.
     field
-        ``f(t, x, p)``, one value per state: the time derivative of the state.
+        ``f(t, x, p)``, one value per state: the time derivative of the state. What the system declares as
+        held or as a counter has none.
     jacobian
-        Optional ``(t, x, p)`` function that returns the rows of ``D_x f``, each of ``n`` values, or of
-        ``n + 1`` with ``D_t f`` last. Derived from ``field`` if omitted.
+        Optional ``(t, x, p)`` function that returns the rows of ``D_x f``, one per value of the field, each
+        of ``n`` values, a column for every component of ``x``, or of ``n + 1`` with ``D_t f`` last. Derived
+        from ``field`` if omitted.
     part_of
         Name of the mode that this one is a part of, in a system that has been split; else None.
 

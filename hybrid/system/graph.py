@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
-from html import escape
 from itertools import accumulate
-from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
 from hybrid import arguments
-from hybrid.display.tables import html_table, table, with_unit
 from hybrid.errors import ArgumentError, ModelError, unknown_name
 from hybrid.system.checks import check_angles, check_functions
-from hybrid.system.clocks import Clock, fault_of, numbers_of
-from hybrid.system.elements import END, Guard, Mode, Transition
+from hybrid.system.clocks import fault_of, numbers_of
+from hybrid.system.described import described, described_in_html
+from hybrid.system.elements import END, Mode, Transition
 from hybrid.system.functions import ModelFunction, functions_in
 from hybrid.system.growth import Growth, grows
 from hybrid.system.laws import Laws, placed
@@ -29,12 +27,6 @@ from hybrid.system.watched import Watched
 
 if TYPE_CHECKING:
     import networkx as nx
-
-
-TRANSITION_COLUMNS = ("transition", "from", "to", "guard", "condition", "reset", "limit of chatter")
-# Width of a terminal, in characters.
-WIDTH = 100
-GUARD_SIDES = {-1: "falls", 0: "either way", 1: "rises"}
 
 
 def _as_modes(value: Iterable[Mode]) -> tuple[Mode, ...]:
@@ -228,73 +220,11 @@ class HybridSystem(Portable):
 
     def __repr__(self) -> str:
         """The system in one table: state, parameters, modes and transitions."""
-        rows = self._transition_rows()
-        heading = [fill(line, WIDTH, subsequent_indent="    ") for line in self._heading()]
-        return "\n".join([*heading, "", table(TRANSITION_COLUMNS, rows) if rows else "no transitions"])
+        return described(self)
 
     def _repr_html_(self) -> str:
         """The table of the system for a notebook."""
-        heading = "<br>".join(map(escape, self._heading()))
-        return f"<p>{heading}</p>\n{html_table(TRANSITION_COLUMNS, self._transition_rows())}"
-
-    def _heading(self) -> list[str]:
-        units = self.units
-        told = [with_unit(name, units.get(name)) for name in self.state_names]
-        moving, tangent = self.variables.moving, self.tangent_dimension
-        state = ", ".join(told[:moving])
-        if isinstance(self.state, int) and not any(name in units for name in self.state_names):
-            state = f"{self.state} components"
-        parameters = ", ".join(
-            f"{name} = {value:.6g} {units.get(name, '')}".rstrip() for name, value in self.parameters.items()
-        )
-        lines = [
-            f"HybridSystem {self.name}".rstrip(),
-            f"state: {state}",
-            f"parameters: {parameters or 'none'}",
-            f"modes: {', '.join(map(repr, self.mode_names))}",
-        ]
-        if self.counters:
-            lines.insert(2, f"counters: {', '.join(told[tangent:])}")
-        if self.held:
-            lines.insert(2, f"held: {', '.join(told[moving:tangent])}")
-        if "t" in units:
-            lines.insert(2, f"time: {with_unit('t', units['t'])}")
-        if self.start is not None:
-            lines.append(f"start: {self.start!r}")
-        if self.angles:
-            turns = ", ".join(f"{name} turns in {turn:.6g}" for name, turn in self.angles.items())
-            lines.append(f"angles: {turns}")
-        if self.period is not None:
-            lines.append(f"period: {self._period_told()}")
-        if self.switching:
-            inside = "; ".join(f"{', '.join(names)} in mode {mode}" for mode, names in self.switching.items())
-            lines.append(f"kinks or jumps inside of modes: {inside} (hybrid.split makes modes of them)")
-        lines += self.notes
-        if not self.is_whole:
-            lines.append("A run adds the modes that it needs.")
-        return lines
-
-    def _period_told(self) -> str:
-        """The period at the default parameters, if it has one there."""
-        try:
-            period = f"{self.forcing_period():.6g}"
-        except (ArithmeticError, ValueError):
-            return "a function of the parameters"
-        return f"{period}, a function of the parameters" if callable(self.period) else period
-
-    def _transition_rows(self) -> list[list[str]]:
-        return [
-            [
-                transition.name,
-                transition.source,
-                END if transition.target is None else transition.target,
-                _guard_told(transition.guard),
-                "" if transition.guard.when is None else "yes",
-                "" if transition.reset is None else "yes",
-                transition.accumulates_to or "",
-            ]
-            for transition in self.transitions
-        ]
+        return described_in_html(self)
 
     @cached_property
     def switching(self) -> dict[str, list[str]]:
@@ -464,13 +394,6 @@ class HybridSystem(Portable):
                 f"HybridSystem: no transition joins mode {lonely[0]!r} to the others. Modes: "
                 f"{', '.join(self.mode_names)}. Add a transition, or make it a separate system."
             )
-
-
-def _guard_told(guard: Guard | Clock) -> str:
-    """When a transition fires, in few words."""
-    if isinstance(guard, Clock):
-        return guard.told
-    return GUARD_SIDES[guard.direction] + (", at the start" if guard.at_start else "")
 
 
 def ticks_of(system: HybridSystem, x: np.ndarray, parameters: np.ndarray) -> list[float]:

@@ -137,11 +137,8 @@ class Splitter:
             for size, (t, point) in product(SIZES, sample_points(self.original.dimension)):
                 x = size * point
                 cell = self._cell_at(pieces, self._values(t, x, parameters))
-                flow = pieces.flow(dict(cell.branches))
-                whole, part = (
-                    evaluate(self.variables, each, t, x, parameters)
-                    for each in (field_function(mode, self.variables).value, flow)
-                )
+                fields = field_function(mode, self.variables).value, pieces.flow(dict(cell.branches))
+                whole, part = (evaluate(self.variables, each, t, x, parameters) for each in fields)
                 if whole is None or part is None:
                     continue
                 scale = max(np.abs(whole).max(), np.abs(part).max())

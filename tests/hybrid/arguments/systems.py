@@ -27,7 +27,7 @@ BAD_STATES = [
     None, "qv", 0, -1, 1.5, True, (), ("1q",), (1, 2), math.nan, 2**70,
     [["q", "v"], ["w"]], np.array(["q"])[:, None],
 ]  # fmt: skip
-MEMORY = [None, "u", 1, True, ("1u",), ("u", "u"), ("q",), (1,), {"u"}, [["u"]], Odd()]
+MEMORY = [None, "u", 1, True, ("1u",), ("u", "u"), (1,), {"u"}, [["u"]], Odd()]
 
 
 def systems():
