@@ -115,6 +115,7 @@ def _found_start(
     # A drive brings a small start to its own size; without a drive, the size stays.
     ends = (0.02, 2.0) if system.forcing_period(values) is not None else (2.0, 0.02)
     random = rng.uniform(-1.0, 1.0, (STARTS_TRIED, n)).round(3)
+    random[:, system.tangent_dimension :] = 0.0
     tries = [np.zeros(n), *(np.geomspace(*ends, STARTS_TRIED)[:, None] * random)]
     best: tuple[float, tuple[float, ...], str | None] | None = None
     for x in tries:

@@ -26,11 +26,11 @@ class ExponentsFigure:
         self.made = blank("Lyapunov exponents", "exponents", 240)
         self.made.add_layout(zero_line())
         self.axes = Axes(self.made)
-        self.index = (0.7, system.dimension + 0.3)
+        self.index = (0.7, system.tangent_dimension + 0.3)
         self.made.scatter("index", "value", source=self.values, size=8, color=COLOURS[0])
         self.made.add_layout(Whisker(base="index", lower="low", upper="high", source=self.values))
         self.made.add_tools(HoverTool(tooltips=[("exponent", "@text")]))
-        self.made.xaxis.ticker = list(range(1, system.dimension + 1))
+        self.made.xaxis.ticker = list(range(1, system.tangent_dimension + 1))
         self.made.xaxis.axis_label = "exponent"
         unit = system.units.get("t")
         self.made.yaxis.axis_label = f"1/{unit}" if unit else "per unit of time"
