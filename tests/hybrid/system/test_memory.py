@@ -14,12 +14,15 @@ from hybrid import (
     ModelError,
     Reset,
     Transition,
+    attractors,
+    continue_orbit,
     periodic_orbit,
     saltation_matrix,
     simulate,
     simulate_many,
     split,
 )
+from hybrid.testing import check_system
 
 A, B, K, T = 1.0, 2.0, 1.2, 0.125
 # Ticks of the clock per period of the forcing.
@@ -323,6 +326,46 @@ def test_split_keeps_what_is_held():
     assert arc.status.ok
     assert arc["n"][-1] == 7
     assert arc.fundamental.shape == (3, 3)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda system, orbit: lyapunov.two_orbit_exponents(system, orbit.x0, intervals=2),
+        lambda system, orbit: orbit.sensitivity(["e"]),
+        lambda system, orbit: continue_orbit(orbit, "e", (0.9, 1.0)),
+        lambda system, orbit: attractors(system, {"q": (0.1, 1.0), "v": 0.0, "n": 0}),
+    ],
+)
+def test_what_compares_whole_states_refuses_counters(call):
+    system = ball(restitution=1.0)
+    orbit = periodic_orbit(system, (0.5, 0.0), period=2.0)
+    with pytest.raises(ArgumentError, match="compares whole states, and a counter never comes back"):
+        call(system, orbit)
+
+
+@pytest.mark.parametrize("system", [ball(), sampled_loop(counters=())])
+def test_check_system(system):
+    check_system(system, examples=10)
+
+
+def test_guards_and_fields_read_counters():
+    """A ball that leaves at its fifth bounce; a growth rate that is counted."""
+    bouncing = ball(restitution=1.0)
+    leaving = Transition("flight", None, Guard(lambda t, x, p: x.n - 4.5, +1), name="enough")
+    arc = simulate(
+        attrs.evolve(bouncing, transitions=[*bouncing.transitions, leaving]), (0.5, 0.0), (0, 20.0)
+    )
+    assert arc["n"][-1] == 5
+    assert arc.t[-1] == pytest.approx(9.0, abs=1e-12)
+    growing = HybridSystem(
+        state=("q",),
+        counters=("n",),
+        modes=[Mode("run", lambda t, x, p: (x.n * x.q,))],
+        transitions=[Transition("run", "run", Every(1.0), Reset(lambda t, x, p: {"n": x.n + 1}))],
+    )
+    arc = simulate(growing, (1.0,), (0.0, 2.5), tangent=True)
+    np.testing.assert_allclose([arc["q"][-1], arc.fundamental[0, 0]], np.exp(2.0), rtol=1e-9)
 
 
 def test_repr_lists_them():
