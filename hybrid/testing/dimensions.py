@@ -130,6 +130,10 @@ class UnitAlgebra:
         names = dict.fromkeys(each for content in contents for each in content.names)
         return attrs.evolve(self._result(name, contents), names=tuple(names)[:MOST_NAMES])
 
+    def looked_up(self, pieces: Any, content: Quantity, derived: int) -> Quantity:
+        """The unit of a table's values is not known."""
+        return Quantity(None)
+
     def _result(self, name: str, contents: tuple[Quantity, ...]) -> Quantity:
         pure, first = Quantity(unit_of("")), contents[0]
         common = self._common(name, contents[name == WHERE :]) if name in ALIKE else Quantity(None)

@@ -1,0 +1,79 @@
+"""Tables as an operation on expressions: one node, with the piecewise polynomial attached."""
+
+# ruff: noqa: D102 - methods that override others are explained there
+
+from __future__ import annotations
+
+from typing import Any
+
+from hybrid.expression.graph import degree_of, symbols_of
+from hybrid.expression.nodes import ZERO, Expression, _kept, number
+from hybrid.expression.operations import RealFunction
+from hybrid.expression.pieces import Pieces
+from hybrid.expression.ranges import Range, closed
+from hybrid.expression.values import looked_up
+
+
+class Tabulated(RealFunction):
+    """The value of a table at ``u``, or a derivative of some order of its pieces."""
+
+    __slots__ = ("derived", "pieces")
+
+    word = "table"
+    pieces: Pieces
+    derived: int
+
+    def __new__(cls, u: Expression, pieces: Pieces, derived: int = 0) -> Any:
+        if derived > pieces.degree:
+            return ZERO
+        if u.is_number:
+            return number(float(pieces.at(float(u), derived)))
+        return _kept(cls, u, pieces, derived)
+
+    def _begin(self, *args: Any) -> None:
+        u, self.pieces, self.derived = args
+        super()._begin(u)
+        # Terms stand in the same order in every process.
+        first, size, numbers, word = self.order
+        self.order = first, size, numbers, word ^ int(self.pieces.name[1:], 16) ^ self.derived
+
+    @property
+    def attached(self) -> Any:  # type: ignore[override]
+        return self.pieces, self.derived
+
+    def numpy(self, u: Any) -> Any:  # type: ignore[override]
+        """The values at numbers."""
+        return looked_up(self.pieces, u, self.derived)
+
+    def range(self, u: Range) -> Range:  # type: ignore[override]
+        """All values, wherever it is read."""
+        return closed(*self.pieces.ends(self.derived))
+
+    def slope(self, place: int = 0) -> Expression:
+        found: Expression = Tabulated(self.args[0], self.pieces, self.derived + 1)
+        return found
+
+    @property
+    def jumps(self) -> bool:
+        """Whether it jumps at a knot."""
+        return self.pieces.jumps(self.derived)
+
+    @property
+    def number_of_piece(self) -> Expression:
+        """A table that jumps at every knot."""
+        found: Expression = Tabulated(self.args[0], self.pieces.places())
+        return found
+
+
+def has_knots_in_time(node: Expression) -> bool:
+    """Whether a node is a table of an affine function of the time alone: its knots end steps."""
+    return isinstance(node, Tabulated) and is_affine_in_time(node.args[0])
+
+
+def is_affine_in_time(argument: Expression) -> bool:
+    """Whether an expression is ``a t + b``, with ``a`` and ``b`` of numbers and parameters."""
+    found = symbols_of(argument)
+    times = frozenset(each for each in found if each.label == "t")
+    if not times or any(each.label.startswith("x[") for each in found):
+        return False
+    return degree_of(argument, times) == 1
