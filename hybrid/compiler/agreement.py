@@ -10,7 +10,8 @@ import numpy as np
 from hybrid.compiler.emitted import Emitted
 from hybrid.errors import ModelError
 from hybrid.expression.pieces import Pieces
-from hybrid.expression.values import WHERE, TraceError, values_of
+from hybrid.expression.values import TraceError, values_of
+from hybrid.expression.vocabulary import WHERE
 from hybrid.system.derivatives import complex_step, evaluate, sample_points
 from hybrid.system.functions import CONDITION, ModelFunction
 from hybrid.system.graph import HybridSystem, functions_of

@@ -19,6 +19,7 @@ from hybrid.compiler.cache.folder import announced
 from hybrid.compiler.cache.loader import Absent, load_kernels
 from hybrid.compiler.parts import EVENTS, FIELDS, SERIES, TANGENT_SERIES, VARIATIONAL
 from hybrid.compiler.surfaces import is_paired
+from hybrid.compiler.tables import Knots, unpacked
 from hybrid.compiler.traced import key_of
 from hybrid.errors import ArgumentError, ModelError
 from hybrid.kernels.types.codes import DESINGULARISED, NARROW, NO_MODE, ROOTED, RUNGE_KUTTA
@@ -126,7 +127,7 @@ class CompiledSystem:
         self, kernel: str, number: int, index: int, t: float, x: Any, parameters: Any, out: np.ndarray
     ) -> None:
         call = vars(load_kernels("hybrid.kernels.evaluate"))[kernel]
-        model = self._model.replace(parameters=np.array(parameters, dtype=float))
+        model = self._model.replace(parameters=self.with_tables(np.array(parameters, dtype=float)))
         call(model, number, index, float(t), np.array(x, dtype=float), out)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -218,7 +219,8 @@ class CompiledSystem:
         """A model at parameter values."""
         values = self.system.parameter_values(parameters)
         period = self.period_at(values, given=bool(parameters))
-        changes: dict[str, Any] = {"parameters": values, "period": period}
+        changes: dict[str, Any] = {"period": period, **self.knots_at(values)}
+        values = changes["parameters"] = self.with_tables(values)
         if self.emitted.programs.rows:
             changes["programs"] = self._programs.replace(parameters=values)
         found = model.replace(**changes)
@@ -255,8 +257,27 @@ class CompiledSystem:
             checked=_indices(programs.checked),
             numbers=np.array(programs.numbers, dtype=float),
             first=_indices(programs.first),
-            parameters=self.system.parameter_values(),
+            parameters=self.with_tables(self.system.parameter_values()),
         )
+
+    @cached_property
+    def _tables(self) -> np.ndarray:
+        return unpacked(self.emitted.tables)
+
+    @cached_property
+    def _knots(self) -> Knots:
+        return Knots(self.system)
+
+    def with_tables(self, values: np.ndarray) -> np.ndarray:
+        """A parameter vector as kernels get it: with the numbers of the tables behind it."""
+        return np.concatenate([values, self._tables]) if self.emitted.tables else values
+
+    def knots_at(self, values: np.ndarray) -> dict[str, np.ndarray]:
+        """The times at which tables of time have their points, as fields of a model that has any."""
+        if not self.emitted.tables:
+            return {}
+        knots = self._knots.at(values)
+        return {"knots": knots, "before_knots": np.nextafter(knots, -np.inf)}
 
     @cached_property
     def _model(self) -> Any:
@@ -270,7 +291,9 @@ class CompiledSystem:
             variational_field=Absent(),
             series=Absent(),
             **self.emitted.arrays(),
-            parameters=system.parameter_values(),
+            parameters=self.with_tables(system.parameter_values()),
+            **{"knots": np.empty(0), "before_knots": np.empty(0), **self.knots_at(system.parameter_values())},
+            first_knot=self._first_knots(),
             dimension=system.dimension,
             first_outgoing=first_outgoing,
             outgoing=outgoing,
@@ -304,6 +327,11 @@ class CompiledSystem:
             tangent_columns=_indices(each.series.tangent_columns for each in self.emitted.propagators),
             period=0.0,
         )
+
+    def _first_knots(self) -> np.ndarray:
+        if self.emitted.tables:
+            return self._knots.first
+        return np.zeros(len(self.system.modes) + 1, dtype=np.int64)
 
     @cached_property
     def is_smooth(self) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import math
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -32,7 +32,7 @@ class Pieces:
         A word that tells it from others, the same in every process.
     """
 
-    known: WeakValueDictionary[str, Pieces] = WeakValueDictionary()
+    known: ClassVar[WeakValueDictionary[str, Pieces]] = WeakValueDictionary()
     knots: np.ndarray
     coefficients: np.ndarray
     name: str

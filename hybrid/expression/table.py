@@ -100,8 +100,8 @@ def _points(x: Any, y: Any) -> tuple[np.ndarray, np.ndarray]:
     if falls.size:
         i = int(falls[0])
         raise ArgumentError(
-            f"x must increase; got x[{i}] = {points[i]} and x[{i + 1}] = {points[i + 1]}. Sort the points, and "
-            "keep one of those at the same place (a jump is kind='step')."
+            f"x must increase; got x[{i}] = {points[i]} and x[{i + 1}] = {points[i + 1]}. Sort the points, "
+            "and keep one of those at the same place (a jump is kind='step')."
         )
     return points, values
 

@@ -32,8 +32,8 @@ from hybrid.expression.vocabulary import (
     REDUCTIONS,
     TRUTHS,
     UFUNCS,
+    WHERE,
 )
-from hybrid.expression.vocabulary import WHERE as WHERE
 from hybrid.system.variables import PARAMETERS, STATE, named_values
 
 

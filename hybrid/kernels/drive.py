@@ -4,7 +4,8 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.clock import forward, set_clock, time_left
+from hybrid.kernels.arithmetic.clock import forward, set_clock, time_before, time_left, time_until
+from hybrid.kernels.arithmetic.tables import knots_passed
 from hybrid.kernels.events.guards import (
     guard_value,
     rounding_band,
@@ -13,6 +14,7 @@ from hybrid.kernels.limit.go import may_accumulate
 from hybrid.kernels.steps.field.jumps import leave
 from hybrid.kernels.steps.field.late import is_late
 from hybrid.kernels.steps.series import series_step
+from hybrid.kernels.steps.step import rates_by_jacobian
 from hybrid.kernels.types.codes import (
     ACCUMULATION,
     DONE,
@@ -209,6 +211,30 @@ def step_by_propagator(parts, task, remaining):
     return code, span
 
 
+@njit(**KERNEL)
+def next_knot(model, run):
+    """The place of the next time at which a table of the mode has a point, or that behind all of them."""
+    first, stop = model.first_knot[run.mode], model.first_knot[run.mode + 1]
+    return first + knots_passed(model.knots, first, stop, run.phase)
+
+
+@njit(**KERNEL)
+def pass_knot(task, knot):
+    """Move a run from the last moment before a knot to the knot, from which the piece behind it holds.
+
+    No step looks at the knot itself, so the moment before belongs to the piece that ends there.
+    """
+    model, run, out = task.model, task.run, task.work.error
+    gap = time_until(run, knot)
+    rates_by_jacobian(model, run.mode, run.phase, run.y, task.tangents, task.work.jacobian, out)
+    for i in range(model.dimension * (1 + task.tangents)):
+        run.y[i] += gap * out[i]
+    run.since_entry += gap
+    set_clock(run, run.cycle, knot)
+    run.last_step = 0.0
+    run.stage = STALE
+
+
 @exported(INTEGER, Parts, Task, INTEGER, REAL, INTEGER, INTEGER)
 def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
     """Advance a run to the time ``stop_cycle`` periods and ``stop_phase``; returns a code.
@@ -244,7 +270,16 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         if run.steps >= max_steps:
             return MAX_STEPS
         mode = run.mode
-        code, span = step(parts, task, remaining)
+        room, knot = remaining, next_knot(model, run)
+        knotted = knot < model.first_knot[mode + 1]
+        if knotted:
+            room = time_before(run.phase, model.before_knots[knot])
+            knotted = room < remaining
+            room = min(room, remaining)
+            if not room > 0.0:
+                pass_knot(task, model.knots[knot])
+                continue
+        code, span = step(parts, task, room)
         if code != GO_ON:
             return int(code)
         if run.pending != NO_TRANSITION:
@@ -261,5 +296,7 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         fired = run.pending
         if span > remaining or (span >= remaining and fired == NO_TRANSITION):
             set_clock(run, stop_cycle, stop_phase)
+        elif knotted and span >= room and fired == NO_TRANSITION:
+            pass_knot(task, model.knots[knot])
         if fired != NO_TRANSITION:
             run.pending = parts.first_in_order(task, fired, stop_cycle, stop_phase)

@@ -12,7 +12,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from hybrid.expression.values import TRUTHS, WHERE, values_of
+from hybrid.expression.values import values_of
+from hybrid.expression.vocabulary import TRUTHS, WHERE
 from hybrid.system.functions import CONDITION
 from hybrid.system.graph import HybridSystem, as_system, functions_of
 from hybrid.system.watched import is_of_library

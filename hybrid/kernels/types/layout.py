@@ -96,6 +96,9 @@ class Model(Structure):
     ``conditional`` for a mode that is left under conditions.
     ``tangent_start`` is the first column of tangent vectors in series, ``tangent_columns`` how many four of
     them have in each mode. ``period`` is 0 without a forcing period.
+    ``knots[first_knot[m]:first_knot[m + 1]]`` are the times at which tables in mode ``m`` have their points:
+    these end steps. ``before_knots`` are the floating-point numbers before them. ``parameters`` go on behind
+    the parameters themselves: there the numbers of the tables are.
     """
 
     field: VECTOR_FUNCTION
@@ -149,6 +152,9 @@ class Model(Structure):
     tangent_start: INTEGER
     tangent_columns: INDICES
     period: REAL
+    first_knot: INDICES
+    knots: VECTOR
+    before_knots: VECTOR
 
 
 class Method(Structure):
