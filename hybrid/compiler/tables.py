@@ -29,7 +29,7 @@ MOST_MOVES = 8
 
 
 class Tables:
-    """The places of the tables of a system behind its parameters, in the order in which they are asked for."""
+    """The places of the tables of a system behind its parameters, in the order of the first question."""
 
     def __init__(self, parameters: int) -> None:
         self.end = parameters

@@ -10,7 +10,7 @@ import numpy as np
 from hybrid import arguments
 from hybrid.errors import ArgumentError
 from hybrid.expression.pieces import Pieces, lines, spline, steps
-from hybrid.expression.values import looked_up
+from hybrid.expression.values import is_traced, looked_up
 
 KINDS = ("linear", "step", "cubic")
 # A polynomial of a higher degree between two points is no table.
@@ -60,8 +60,7 @@ class Table:
     _pieces: Pieces
 
     def __init__(self, x: Any, y: Any = None, kind: str = "linear") -> None:
-        if kind not in KINDS:
-            raise arguments.refusal("kind", f"be one of {', '.join(map(repr, KINDS))}", kind)
+        kind = arguments.one_of("kind", kind, KINDS)
         if y is None and hasattr(x, "c") and hasattr(x, "extrapolate"):
             kind, pieces = "cubic", _of_spline(x)
             points, values = pieces.knots, pieces.at(pieces.knots)
@@ -74,6 +73,8 @@ class Table:
 
     def __call__(self, u: Any) -> Any:
         """The value at a number, or the values at an array of numbers."""
+        if not is_traced(u):
+            u = arguments.numbers("u", u, "be a number or an array of numbers")
         return looked_up(self._pieces, u)
 
     def __repr__(self) -> str:

@@ -4,10 +4,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
-from hybrid.expression.graph import degree_of, symbols_of
-from hybrid.expression.nodes import ZERO, Expression, _kept, number
+from hybrid.errors import ModelError
+from hybrid.expression.graph import Group, degree_of, mentions, nodes_of, symbols_of
+from hybrid.expression.nodes import ZERO, Expression, Symbol, _kept, number
 from hybrid.expression.operations import RealFunction
 from hybrid.expression.pieces import Pieces
 from hybrid.expression.ranges import Range, closed
@@ -77,3 +79,14 @@ def is_affine_in_time(argument: Expression) -> bool:
     if not times or any(each.label.startswith("x[") for each in found):
         return False
     return degree_of(argument, times) == 1
+
+
+def check_tables(what: str, expressions: Iterable[Expression], states: Iterable[Symbol]) -> None:
+    """ModelError if a table jumps in the state: its jumps are not taken apart."""
+    symbols = Group(states)
+    for table in nodes_of(Tabulated, *expressions):
+        if table.jumps and mentions(table, symbols):
+            raise ModelError(
+                f"{what} has a table of {len(table.pieces.knots)} points that jumps in the state, which is not "
+                "made into modes. Use kind='linear', or np.where for a few jumps."
+            )

@@ -362,7 +362,7 @@ def _clipped(a: Any, a_min: Any = None, a_max: Any = None, **bounds: Any) -> Any
 
 def looked_up(pieces: Pieces, u: Any, derived: int = 0) -> Any:
     """The values of a table, or of a derivative, at numbers or traced numbers of any shape."""
-    if not (isinstance(u, TracedArray) or type(u) is Traced or any(map(_is_traced, np.ravel(u)))):
+    if not is_traced(u):
         return pieces.at(u, derived)
 
     def value(each: Any) -> Traced:
@@ -371,8 +371,12 @@ def looked_up(pieces: Pieces, u: Any, derived: int = 0) -> Any:
     return _wrapped(np.frompyfunc(value, 1, 1)(_plain(u)))
 
 
-def _is_traced(value: Any) -> bool:
-    return type(value) is Traced
+def is_traced(value: Any) -> bool:
+    """Whether a value is a traced number, or has any as items."""
+    if type(value) is Traced or isinstance(value, TracedArray):
+        return True
+    items = isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.dtype == object)
+    return items and any(map(is_traced, value if np.ndim(value) else ()))
 
 
 def _interpolated(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, period: Any = None) -> Any:

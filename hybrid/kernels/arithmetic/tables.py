@@ -1,4 +1,4 @@
-"""Tables, which lie behind the parameters of a model: number of knots, degree, knots, coefficients by piece."""
+"""Tables: number of knots, degree, knots, coefficients piece by piece, behind the parameters of a model."""
 
 import math
 
