@@ -24,8 +24,10 @@ from hybrid.system.graph import HybridSystem
 
 # The name of a table in generated text, before it is known where its numbers begin.
 NAME = re.compile(r"\bT[0-9a-f]{16}\b")
-# A time is moved by its rounding so often, at most, to where the table's argument has just passed the knot.
-MOST_MOVES = 8
+# The rounding of an affine argument and of its inverse, as a share of the terms, with a margin.
+MARGIN = 16.0 * float(np.finfo(float).eps)
+# Halvings that bring an interval of this size down to two neighbouring numbers, unless these are next to 0.
+MOST_HALVINGS = 64
 
 
 class Tables:
@@ -89,8 +91,10 @@ class Knots:
 
     def _times(self, node: Tabulated, values: np.ndarray) -> np.ndarray:
         """The first times at which the argument of a table has reached its knots, in floating point."""
-        program, knots = Program(node.args), node.pieces.knots
-        known = dict(zip(self.symbols.p, values, strict=False))
+        knots = node.pieces.knots
+        if node.args[0] is self.symbols.t:
+            return knots
+        program, known = Program(node.args), dict(zip(self.symbols.p, values, strict=False))
 
         def argument(t: np.ndarray) -> np.ndarray:
             return np.asarray(program.run({**known, self.symbols.t: t})[0], dtype=float)
@@ -100,13 +104,14 @@ class Knots:
         if not (np.isfinite(slope) and slope != 0.0):
             return np.full(len(knots), np.inf)
         times = (knots - start) / slope
-        for _ in range(MOST_MOVES):
-            before = np.nextafter(times, -np.inf)
-            # A falling argument has left a piece, which holds at its knot, right behind that.
-            passed = (argument(times) >= knots) if slope > 0.0 else (argument(times) < knots)
-            early = (argument(before) >= knots) if slope > 0.0 else (argument(before) < knots)
-            times = np.where(early, before, np.where(passed, times, np.nextafter(times, np.inf)))
-        return times
+        around = MARGIN * (np.abs(knots) + np.abs(start) + np.abs(end)) / abs(slope)
+        low, high = times - around, times + around
+        for _ in range(MOST_HALVINGS):
+            middle = 0.5 * (low + high)
+            # A falling argument leaves a piece right behind its knot, where that piece still holds.
+            reached = argument(middle) >= knots if slope > 0.0 else argument(middle) < knots
+            low, high = np.where(reached, low, middle), np.where(reached, middle, high)
+        return high
 
 
 def _tables_in_time(system: HybridSystem, index: int, traces: Traces) -> Iterator[Tabulated]:

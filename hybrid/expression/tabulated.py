@@ -87,6 +87,6 @@ def check_tables(what: str, expressions: Iterable[Expression], states: Iterable[
     for table in nodes_of(Tabulated, *expressions):
         if table.jumps and mentions(table, symbols):
             raise ModelError(
-                f"{what} has a table of {len(table.pieces.knots)} points that jumps in the state, which is not "
-                "made into modes. Use kind='linear', or np.where for a few jumps."
+                f"{what} has a table of {len(table.pieces.knots)} points that jumps in the state, which is "
+                "not made into modes. Use kind='linear', or np.where for a few jumps."
             )
