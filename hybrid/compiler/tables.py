@@ -84,8 +84,10 @@ class Knots:
         return self._found(values) if self._fixed is None else self._fixed
 
     def _found(self, values: np.ndarray) -> np.ndarray:
+        nothing = np.empty(0)
         found = [
-            np.concatenate([self._times(node, values) for node in tables] or [[]]) for tables in self.tables
+            np.concatenate([nothing, *(self._times(node, values) for node in tables)])
+            for tables in self.tables
         ]
         return np.concatenate([np.sort(each) for each in found])
 

@@ -69,7 +69,7 @@ class Table:
             pieces = _pieces_of(points, values, kind)
         for each in (points, values):
             each.flags.writeable = False
-        self.__attrs_init__(points, values, kind, pieces)  # type: ignore[attr-defined]
+        self.__attrs_init__(points, values, kind, pieces)
 
     def __call__(self, u: Any) -> Any:
         """The value at a number, or the values at an array of numbers."""

@@ -40,14 +40,14 @@ class Tabulated(RealFunction):
         self.order = first, size, numbers, word ^ int(self.pieces.name[1:], 16) ^ self.derived
 
     @property
-    def attached(self) -> Any:  # type: ignore[override]
+    def attached(self) -> Any:
         return self.pieces, self.derived
 
-    def numpy(self, u: Any) -> Any:  # type: ignore[override]
+    def numpy(self, u: Any) -> Any:
         """The values at numbers."""
         return looked_up(self.pieces, u, self.derived)
 
-    def range(self, u: Range) -> Range:  # type: ignore[override]
+    def range(self, u: Range) -> Range:
         """All values, wherever it is read."""
         return closed(*self.pieces.ends(self.derived))
 
