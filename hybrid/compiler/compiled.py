@@ -274,10 +274,7 @@ class CompiledSystem:
 
     def knots_at(self, values: np.ndarray) -> dict[str, np.ndarray]:
         """The times at which tables of time have their points, as fields of a model that has any."""
-        if not self.emitted.tables:
-            return {}
-        knots = self._knots.at(values)
-        return {"knots": knots, "before_knots": np.nextafter(knots, -np.inf)}
+        return self._knots.at(values) if self.emitted.tables else {}
 
     @cached_property
     def _model(self) -> Any:
@@ -292,8 +289,7 @@ class CompiledSystem:
             series=Absent(),
             **self.emitted.arrays(),
             parameters=self.with_tables(system.parameter_values()),
-            **{"knots": np.empty(0), "before_knots": np.empty(0), **self.knots_at(system.parameter_values())},
-            first_knot=self._first_knots(),
+            **{**_no_knots(len(system.modes)), **self.knots_at(system.parameter_values())},
             dimension=system.dimension,
             first_outgoing=first_outgoing,
             outgoing=outgoing,
@@ -327,11 +323,6 @@ class CompiledSystem:
             tangent_columns=_indices(each.series.tangent_columns for each in self.emitted.propagators),
             period=0.0,
         )
-
-    def _first_knots(self) -> np.ndarray:
-        if self.emitted.tables:
-            return self._knots.first
-        return np.zeros(len(self.system.modes) + 1, dtype=np.int64)
 
     @cached_property
     def is_smooth(self) -> bool:
@@ -383,6 +374,12 @@ def _program_runners(needed: bool) -> dict[str, Any]:
 
 def _index_or_none(system: HybridSystem, mode: str | None) -> int:
     return NO_MODE if mode is None else system.mode_index(mode)
+
+
+def _no_knots(modes: int) -> dict[str, np.ndarray]:
+    """The knots of a model without tables in time."""
+    firsts = {"first_group": np.zeros(modes + 1, dtype=np.int64), "first_knot": np.zeros(1, dtype=np.int64)}
+    return {**firsts, **{name: np.empty(0) for name in ("repeat", "knots", "before_knots")}}
 
 
 def _indices(values: Any) -> np.ndarray:

@@ -17,7 +17,7 @@ from hybrid.expression.evaluation import Program
 from hybrid.expression.graph import nodes_of
 from hybrid.expression.nodes import Expression
 from hybrid.expression.pieces import Pieces
-from hybrid.expression.tabulated import Tabulated, has_knots_in_time
+from hybrid.expression.tabulated import Tabulated, has_knots_in_time, repeat_of
 from hybrid.expression.tracing import model_symbols
 from hybrid.system.functions import condition_function, field_function, guard_function
 from hybrid.system.graph import HybridSystem
@@ -62,34 +62,54 @@ def unpacked(text: str) -> np.ndarray:
 class Knots:
     """The times at which tables of time in the functions of each mode have their points.
 
-    Attributes
-    ----------
-    first
-        By mode: the first of its knots, and behind them the number of all.
+    They come in groups: those that come once, and for each period those that come again and again.
     """
 
     def __init__(self, system: HybridSystem) -> None:
         self.system = system
         self.symbols = model_symbols(system.dimension, len(system.parameters))
         traces: Traces = {}
-        self.tables = [[*_tables_in_time(system, index, traces)] for index in range(len(system.modes))]
-        counts = [sum(len(node.pieces.knots) for node in tables) for tables in self.tables]
-        self.first = np.cumsum([0, *counts], dtype=np.int64)
-        self._fixed: np.ndarray | None = None
-        if not any(node.mask & self.symbols.p.mask for tables in self.tables for node in tables):
+        self.groups: list[tuple[Expression | None, list[Tabulated]]] = []
+        first = [0]
+        for index in range(len(system.modes)):
+            own: dict[Expression | None, list[Tabulated]] = {}
+            for node in _tables_in_time(system, index, traces):
+                own.setdefault(repeat_of(node), []).append(node)
+            self.groups += own.items()
+            first.append(len(self.groups))
+        self.first_group = np.array(first, dtype=np.int64)
+        self._fixed: dict[str, np.ndarray] | None = None
+        if not any(node.mask & self.symbols.p.mask for _, tables in self.groups for node in tables):
             self._fixed = self._found(system.parameter_values())
 
-    def at(self, values: np.ndarray) -> np.ndarray:
-        """The times ``(N,)``, increasing within each mode, at parameter values; infinity stands for none."""
+    def at(self, values: np.ndarray) -> dict[str, np.ndarray]:
+        """The fields of a model that hold the knots, at parameter values; infinity stands for none."""
         return self._found(values) if self._fixed is None else self._fixed
 
-    def _found(self, values: np.ndarray) -> np.ndarray:
-        nothing = np.empty(0)
-        found = [
-            np.concatenate([nothing, *(self._times(node, values) for node in tables)])
-            for tables in self.tables
-        ]
-        return np.concatenate([np.sort(each) for each in found])
+    def _found(self, values: np.ndarray) -> dict[str, np.ndarray]:
+        repeats, groups = [], []
+        for repeat, tables in self.groups:
+            length = 0.0 if repeat is None else self._number(repeat, values)
+            if repeat is None:
+                knots = np.concatenate([self._times(node, values) for node in tables])
+            else:
+                # The period itself is a point: there the table begins again.
+                knots = np.concatenate([*(node.pieces.knots for node in tables), [length]])
+                knots[~((knots > 0.0) & (knots <= length))] = np.inf
+            repeats.append(length if 0.0 < length < np.inf else 0.0)
+            groups.append(np.sort(knots))
+        knots = np.concatenate([np.empty(0), *groups])
+        return {
+            "first_group": self.first_group,
+            "repeat": np.array(repeats, dtype=float),
+            "first_knot": np.cumsum([0, *map(len, groups)], dtype=np.int64),
+            "knots": knots,
+            "before_knots": np.nextafter(knots, -np.inf),
+        }
+
+    def _number(self, expression: Expression, values: np.ndarray) -> float:
+        known = dict(zip(self.symbols.p, values, strict=False))
+        return float(Program([expression]).run(known)[0])
 
     def _times(self, node: Tabulated, values: np.ndarray) -> np.ndarray:
         """The first times at which the argument of a table has reached its knots, in floating point."""

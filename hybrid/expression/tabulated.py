@@ -10,7 +10,7 @@ from typing import Any
 from hybrid.errors import ModelError
 from hybrid.expression.graph import Group, degree_of, mentions, nodes_of, symbols_of
 from hybrid.expression.nodes import ZERO, Expression, Symbol, _kept, number
-from hybrid.expression.operations import RealFunction
+from hybrid.expression.operations import RealFunction, Remainder
 from hybrid.expression.pieces import Pieces
 from hybrid.expression.ranges import Range, closed
 from hybrid.expression.values import looked_up
@@ -68,17 +68,26 @@ class Tabulated(RealFunction):
 
 
 def has_knots_in_time(node: Expression) -> bool:
-    """Whether a node is a table of an affine function of the time alone: its knots end steps."""
-    return isinstance(node, Tabulated) and is_affine_in_time(node.args[0])
+    """Whether a node is a table of ``a t + b``, or of ``t % T``: its knots end steps.
 
-
-def is_affine_in_time(argument: Expression) -> bool:
-    """Whether an expression is ``a t + b``, with ``a`` and ``b`` of numbers and parameters."""
-    found = symbols_of(argument)
-    times = frozenset(each for each in found if each.label == "t")
-    if not times or any(each.label.startswith("x[") for each in found):
+    ``a``, ``b`` and ``T`` are made of numbers and parameters.
+    """
+    if not isinstance(node, Tabulated):
         return False
-    return degree_of(argument, times) == 1
+    argument = node.args[0]
+    names = {each.label for each in symbols_of(argument)}
+    if "t" not in names or any(name.startswith("x[") for name in names):
+        return False
+    time = Symbol("t")
+    return repeat_of(node) is not None or degree_of(argument, frozenset((time,))) == 1
+
+
+def repeat_of(node: Tabulated) -> Expression | None:
+    """``T`` of a table of ``t % T``; None for other tables."""
+    argument, time = node.args[0], Symbol("t")
+    if isinstance(argument, Remainder) and argument.args[0] is time and not argument.args[1].mask & time.mask:
+        return argument.args[1]
+    return None
 
 
 def check_tables(what: str, expressions: Iterable[Expression], states: Iterable[Symbol]) -> None:

@@ -373,10 +373,9 @@ def looked_up(pieces: Pieces, u: Any, derived: int = 0) -> Any:
 
 def is_traced(value: Any) -> bool:
     """Whether a value is a traced number, or has any as items."""
-    if type(value) is Traced or isinstance(value, TracedArray):
-        return True
-    items = isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.dtype == object)
-    return items and any(map(is_traced, value if np.ndim(value) else ()))
+    if isinstance(value, list | tuple):
+        return any(type(each) is Traced or isinstance(each, TracedArray) for each in value)
+    return type(value) is Traced or isinstance(value, TracedArray)
 
 
 def _interpolated(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, period: Any = None) -> Any:

@@ -36,7 +36,7 @@ from hybrid.kernels.types.codes import (
     TERMINAL,
 )
 from hybrid.kernels.types.kinds import INTEGER, REAL
-from hybrid.kernels.types.layout import Parts, Task
+from hybrid.kernels.types.layout import EPSILON, Parts, Task
 from hybrid.kernels.types.options import KERNEL, exported
 
 # More jumps than this at one instant, in total or per transition, count as endless.
@@ -46,6 +46,8 @@ MOST_JUMPS_EACH = 100
 # component. A run whose state is at rest, and that needs more than 10^7 such steps, does not get on.
 OF_TIME = 1e-3
 OF_STATE = 1e-4
+# The time of a point of a table that repeats is rounded where whole periods are added.
+ROUNDING_OF_KNOT = 4.0 * EPSILON
 # A landing may be this many times as far from its guard as the rounding of the state.
 MOST_ROUNDING = 64.0
 
@@ -213,9 +215,25 @@ def step_by_propagator(parts, task, remaining):
 
 @njit(**KERNEL)
 def next_knot(model, run):
-    """The place of the next time at which a table of the mode has a point, or that behind all of them."""
-    first, stop = model.first_knot[run.mode], model.first_knot[run.mode + 1]
-    return first + knots_passed(model.knots, first, stop, run.phase)
+    """The next time at which a table of the mode has a point, and the last moment before it.
+
+    Both are infinite if no point is left. The times of tables that repeat are known up to rounding.
+    """
+    last, knot = math.inf, math.inf
+    for group in range(model.first_group[run.mode], model.first_group[run.mode + 1]):
+        repeat, first, stop = model.repeat[group], model.first_knot[group], model.first_knot[group + 1]
+        within = run.phase % repeat if repeat > 0.0 else run.phase
+        place = first + knots_passed(model.knots, first, stop, within)
+        if place == stop:
+            continue
+        at, before = model.knots[place], model.before_knots[place]
+        if repeat > 0.0:
+            middle = run.phase - within + at
+            apart = ROUNDING_OF_KNOT * abs(middle)
+            at, before = middle + apart, middle - apart
+        if at < knot:
+            last, knot = before, at
+    return last, knot
 
 
 @njit(**KERNEL)
@@ -231,6 +249,7 @@ def pass_knot(task, knot):
         run.y[i] += gap * out[i]
     run.since_entry += gap
     set_clock(run, run.cycle, knot)
+    forward(run, model.period, 0.0)
     run.last_step = 0.0
     run.stage = STALE
 
@@ -270,14 +289,12 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         if run.steps >= max_steps:
             return MAX_STEPS
         mode = run.mode
-        room, knot = remaining, next_knot(model, run)
-        knotted = knot < model.first_knot[mode + 1]
-        if knotted:
-            room = time_before(run.phase, model.before_knots[knot])
-            knotted = room < remaining
-            room = min(room, remaining)
+        room = remaining
+        last, knot = next_knot(model, run)
+        if last < math.inf:
+            room = min(time_before(run.phase, last), remaining)
             if not room > 0.0:
-                pass_knot(task, model.knots[knot])
+                pass_knot(task, knot)
                 continue
         code, span = step(parts, task, room)
         if code != GO_ON:
@@ -296,7 +313,7 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         fired = run.pending
         if span > remaining or (span >= remaining and fired == NO_TRANSITION):
             set_clock(run, stop_cycle, stop_phase)
-        elif knotted and span >= room and fired == NO_TRANSITION:
-            pass_knot(task, model.knots[knot])
+        elif room < remaining and span >= room and fired == NO_TRANSITION:
+            pass_knot(task, knot)
         if fired != NO_TRANSITION:
             run.pending = parts.first_in_order(task, fired, stop_cycle, stop_phase)

@@ -31,12 +31,13 @@ def programs(
     forcings: Sequence[Expression | None],
     residues: Sequence[Expression | None],
     symbols: Symbols,
-    tables: Tables,
+    tables: Tables | None = None,
 ) -> Programs:
     """Programs of the guards' expressions, followed by those of the forcings and of the residues.
 
     Where the expression is None or has no interval arithmetic, the program has no rows.
     """
+    tables = Tables(len(symbols.p)) if tables is None else tables
     rows: list[tuple[int, int, int, int]] = []
     checked: list[int] = []
     numbers: dict[float, int] = {}

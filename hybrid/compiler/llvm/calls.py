@@ -11,7 +11,6 @@ import attrs
 from llvmlite import ir
 
 from hybrid.kernels.arithmetic.doubled import write_divided_dot_product
-from hybrid.kernels.arithmetic.tables import HEAD
 from hybrid.kernels.instructions.columns import (
     write_combination,
     write_combination_of_tangents,
@@ -22,7 +21,7 @@ from hybrid.kernels.instructions.columns import (
 )
 from hybrid.kernels.instructions.loops import declared
 from hybrid.kernels.instructions.registers import everywhere, read, write, write_down, write_row
-from hybrid.kernels.types.codes import NARROW
+from hybrid.kernels.types.codes import HEAD, NARROW
 
 NUMBER = ir.DoubleType()
 WHOLE = ir.IntType(64)

@@ -5,11 +5,10 @@ import math
 import numpy as np
 from numba import njit
 
+from hybrid.kernels.types.codes import HEAD
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
-# Where the knots of a table begin.
-HEAD = 2
 # Jumps below this share of the values at the knot are rounding.
 SMALL = 1e-9
 # Rounding of a cubic, in units of that of its terms.

@@ -199,3 +199,29 @@ def test_a_spline_of_scipy_is_told_what_to_write():
 def test_bad_points(x, y, text):
     with pytest.raises(ArgumentError, match=text):
         Table(x, y)
+
+
+@pytest.mark.parametrize("declared", [None, 5.0])
+@pytest.mark.parametrize("kind", ["linear", "step"])
+def test_a_cycle_that_repeats(kind, declared):
+    cycle = Table([0.0, 1.0, 1.001, 5.0], [0.0, 1000.0, 3.0, 0.0], kind=kind)
+    system = HybridSystem(
+        state=("q",),
+        parameters={"T": 5.0},
+        modes=[Mode("fill", lambda t, x, p: (cycle(t % p.T),))],
+        period=declared,
+    )
+    arc = simulate(system, (0.0,), (0.0, 52.0))
+    assert arc.status.code.name == "SUCCESS"
+    assert arc["q"][-1] == pytest.approx(10.0 * integral(cycle, 5.0) + integral(cycle, 2.0), rel=1e-13)
+    assert arc.steps < 200
+    if declared is None:
+        arc = simulate(system, (0.0,), (0.0, 6.0), parameters={"T": 3.0})
+        assert arc["q"][-1] == pytest.approx(2.0 * integral(cycle, 3.0), rel=1e-13)
+
+
+def test_cycles_of_different_lengths():
+    one, other = (Table(TIMES, VALUES + shift, kind="step") for shift in (0.0, 1.0))
+    found = filled(lambda t, x, p: (one(t % 3.0) + other(t % 4.0) + one(t),), end=12.0)
+    wanted = 4.0 * integral(one, 3.0) + 3.0 * integral(other, 4.0) + integral(one, 12.0)
+    assert found == pytest.approx(wanted, rel=1e-13)
