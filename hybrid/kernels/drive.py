@@ -237,6 +237,13 @@ def next_knot(model, run):
 
 
 @njit(**KERNEL)
+def room_before_knot(model, run, remaining):
+    """How long the next step may be, which ends at the last moment before the next knot; and that knot."""
+    last, knot = next_knot(model, run)
+    return (min(time_before(run.phase, last), remaining) if last < math.inf else remaining), knot
+
+
+@njit(**KERNEL)
 def pass_knot(task, knot):
     """Move a run from the last moment before a knot to the knot, from which the piece behind it holds.
 
@@ -289,13 +296,10 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         if run.steps >= max_steps:
             return MAX_STEPS
         mode = run.mode
-        room = remaining
-        last, knot = next_knot(model, run)
-        if last < math.inf:
-            room = min(time_before(run.phase, last), remaining)
-            if not room > 0.0:
-                pass_knot(task, knot)
-                continue
+        room, knot = room_before_knot(model, run, remaining)
+        if not room > 0.0:
+            pass_knot(task, knot)
+            continue
         code, span = step(parts, task, room)
         if code != GO_ON:
             return int(code)
