@@ -266,6 +266,13 @@ def next_knot(model, run):
 
 
 @njit(**KERNEL)
+def room_before_knot(model, run, remaining):
+    """How long the next step may be, which ends at the last moment before the next knot; and that knot."""
+    last, knot = next_knot(model, run)
+    return (min(time_before(run.phase, last), remaining) if last < math.inf else remaining), knot
+
+
+@njit(**KERNEL)
 def pass_knot(task, knot):
     """Move a run from the last moment before a knot to the knot, from which the piece behind it holds.
 
@@ -326,13 +333,10 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         mode = run.mode
         # A tick that is as good as at the end is there.
         until = remaining if tick + band >= remaining else tick
-        room = until
-        last, knot = next_knot(model, run)
-        if last < math.inf:
-            room = min(time_before(run.phase, last), until)
-            if not room > 0.0:
-                pass_knot(task, knot)
-                continue
+        room, knot = room_before_knot(model, run, until)
+        if not room > 0.0:
+            pass_knot(task, knot)
+            continue
         code, span = step(parts, task, room)
         if code != GO_ON:
             return int(code)
@@ -348,11 +352,10 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         if task.tangents > 0 and task.orthonormal != 0 and 0.0 < span < remaining:
             parts.keep_apart(model, run, mode, task.tangents, task.work.jacobian)
         fired = run.pending
-        if span > until or (span >= until and fired == NO_TRANSITION):
-            if until < remaining:
-                go_to_tick(model, run, clock)
-            else:
-                set_clock(run, stop_cycle, stop_phase)
+        if until < remaining and span >= until and fired == NO_TRANSITION:
+            go_to_tick(model, run, clock)
+        elif span > remaining or (span >= remaining and fired == NO_TRANSITION):
+            set_clock(run, stop_cycle, stop_phase)
         elif room < until and span >= room and fired == NO_TRANSITION:
             pass_knot(task, knot)
         if fired != NO_TRANSITION:

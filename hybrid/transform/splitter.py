@@ -228,12 +228,11 @@ class Splitter:
         return Pieces(index, field, watched, self.variables, self.surfaces)
 
     def _guard(self, transition: Transition) -> Expression | None:
-        function = transition.guard.function
         try:
-            traced = trace(function, self.variables.state, self.variables.parameter_names)
+            found = trace(transition.guard.function, self.variables.state, self.variables.parameter_names)
         except TraceError:
             return None
-        return None if transition.clock else traced[0]
+        return None if transition.clock else found[0]
 
     def _reset(self, transition: Transition) -> list[Expression] | None:
         if transition.reset is None:
