@@ -290,6 +290,23 @@ def pass_knot(task, knot):
     run.stage = STALE
 
 
+@njit(**KERNEL)
+def go_forward(model, run, span):
+    """Count the time of a step."""
+    forward(run, model.period, span)
+    run.since_entry += span
+    run.longest_step = max(run.longest_step, span)
+
+
+@njit(**KERNEL)
+def meet(task, clock, knot, at_knot):
+    """Set the clock of a run whose step has ended at the tick of a clock, or before a knot."""
+    if at_knot:
+        pass_knot(task, knot)
+    else:
+        go_to_tick(task.model, task.run, clock)
+
+
 @exported(INTEGER, Parts, Task, INTEGER, REAL, INTEGER, INTEGER)
 def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
     """Advance a run to the time ``stop_cycle`` periods and ``stop_phase``; returns a code.
@@ -314,12 +331,10 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
             if run.stage == ENTERING or run.pending != NO_TRANSITION:
                 continue
         remaining = time_left(model, run, stop_cycle, stop_phase)
-        clock, tick, band = NO_TRANSITION, math.inf, 0.0
-        if has_clocks(model, run.mode):
-            clock, tick, band = next_tick(model, run)
-            if tick <= band:
-                run.pending = fires_at_tick(parts, task, stop_cycle, stop_phase)
-                continue
+        clock, tick, band = next_tick(model, run)
+        if tick <= band:
+            run.pending = fires_at_tick(parts, task, stop_cycle, stop_phase)
+            continue
         if remaining <= 0.0:
             fired = parts.arrived(task)
             if fired == NO_TRANSITION:
@@ -344,19 +359,15 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
             begin_stretch(model, run, remaining)
         elif not gets_on(model, task.method, run, remaining):
             return STEP_TOO_SMALL
-        forward(run, model.period, span)
-        run.since_entry += span
-        run.longest_step = max(run.longest_step, span)
+        go_forward(model, run, span)
         if model.timed[mode] == 1 and is_late(task.method, run):
             parts.late_step(model, task.method, run, span, task.work)
         if task.tangents > 0 and task.orthonormal != 0 and 0.0 < span < remaining:
             parts.keep_apart(model, run, mode, task.tangents, task.work.jacobian)
         fired = run.pending
-        if until < remaining and span >= until and fired == NO_TRANSITION:
-            go_to_tick(model, run, clock)
-        elif span > remaining or (span >= remaining and fired == NO_TRANSITION):
+        if span > remaining or (span >= remaining and fired == NO_TRANSITION):
             set_clock(run, stop_cycle, stop_phase)
-        elif room < until and span >= room and fired == NO_TRANSITION:
-            pass_knot(task, knot)
+        elif span >= room and fired == NO_TRANSITION:
+            meet(task, clock, knot, room < until)
         if fired != NO_TRANSITION:
             run.pending = parts.first_in_order(task, fired, stop_cycle, stop_phase)
