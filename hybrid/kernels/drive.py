@@ -311,9 +311,8 @@ def meet(task, clock, knot, at_knot):
 def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
     """Advance a run to the time ``stop_cycle`` periods and ``stop_phase``; returns a code.
 
-    The run can be taken up again from any code that is not an error: after ``RECORD_FULL`` once the record
-    has been emptied, after ``MAX_STEPS`` and ``MAX_JUMPS`` with larger limits. After ``INCOMPLETE`` it is in
-    the middle of a jump, and has to begin again where this call began, with all parts. Nothing is allocated.
+    The run can be taken up again after ``RECORD_FULL`` once the record has been emptied, after ``MAX_STEPS``
+    and ``MAX_JUMPS`` with larger limits; after ``INCOMPLETE`` where this call began, with all parts.
     """
     model, run = task.model, task.run
     if run.horizon == 0.0 and run.steps == 0:
@@ -328,8 +327,7 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
             code = enter(parts, task)
             if code != GO_ON:
                 return code
-            if run.stage == ENTERING or run.pending != NO_TRANSITION:
-                continue
+            continue
         remaining = time_left(model, run, stop_cycle, stop_phase)
         clock, tick, band = next_tick(model, run)
         if tick <= band:
@@ -345,7 +343,6 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
             return RECORD_FULL
         if run.steps >= max_steps:
             return MAX_STEPS
-        mode = run.mode
         # A tick that is as good as at the end is there.
         until = remaining if tick + band >= remaining else tick
         room, knot = room_before_knot(model, run, until)
@@ -360,10 +357,10 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         elif not gets_on(model, task.method, run, remaining):
             return STEP_TOO_SMALL
         go_forward(model, run, span)
-        if model.timed[mode] == 1 and is_late(task.method, run):
+        if model.timed[run.mode] == 1 and is_late(task.method, run):
             parts.late_step(model, task.method, run, span, task.work)
         if task.tangents > 0 and task.orthonormal != 0 and 0.0 < span < remaining:
-            parts.keep_apart(model, run, mode, task.tangents, task.work.jacobian)
+            parts.keep_apart(model, run, run.mode, task.tangents, task.work.jacobian)
         fired = run.pending
         if span > remaining or (span >= remaining and fired == NO_TRANSITION):
             set_clock(run, stop_cycle, stop_phase)
