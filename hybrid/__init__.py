@@ -12,6 +12,7 @@ from hybrid.accuracy.global_error import GlobalError, global_error
 from hybrid.accuracy.work_precision import WorkPrecision, work_precision
 from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError, HybridError, ModelError
+from hybrid.expression.table import Table
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
 from hybrid.orbits.continuation.continue_bifurcation import (
     BifurcationCurve,
@@ -77,6 +78,7 @@ __all__ = [
     "Solver",
     "Status",
     "StatusCode",
+    "Table",
     "Taylor",
     "Transition",
     "Tsit5",

@@ -36,6 +36,7 @@ DEFAULTS = {
     hybrid.Guard: {"direction": 0, "gradient": None, "when": None, "at_start": False},
     hybrid.Mode: {"jacobian": None, "part_of": None},
     hybrid.Reset: {"jacobian": None},
+    hybrid.Table: {"y": None, "kind": "linear"},
     hybrid.Transition: {"reset": None, "accumulates_to": None, "part_of": None},
     hybrid.HybridSystem: {
         "held": (),

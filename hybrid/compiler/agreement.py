@@ -9,7 +9,9 @@ import numpy as np
 
 from hybrid.compiler.emitted import Emitted
 from hybrid.errors import ModelError
-from hybrid.expression.values import WHERE, TraceError, values_of
+from hybrid.expression.pieces import Pieces
+from hybrid.expression.values import TraceError, values_of
+from hybrid.expression.vocabulary import WHERE
 from hybrid.system.derivatives import complex_step, evaluate, sample_points
 from hybrid.system.functions import CONDITION, ModelFunction
 from hybrid.system.graph import HybridSystem, functions_of
@@ -274,6 +276,10 @@ class _Shaken:
         """The value of the function with random last digits."""
         value = np.where(*contents)[()] if name == WHERE else getattr(np, name)(*contents)
         return _shake(value, self.rng) if value.dtype.kind == "f" else value
+
+    def looked_up(self, pieces: Pieces, content: Any, derived: int) -> Any:
+        """The value of a table with random last digits."""
+        return _shake(pieces.at(content, derived), self.rng)
 
     def expression(self, content: Any) -> Any:
         """There is none."""

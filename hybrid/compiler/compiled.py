@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
-from itertools import accumulate, chain
 from threading import RLock
 from typing import TYPE_CHECKING, Any
 
@@ -18,14 +17,15 @@ from hybrid.compiler.agreement import check_agreement
 from hybrid.compiler.cache import store
 from hybrid.compiler.cache.folder import announced
 from hybrid.compiler.cache.loader import Absent, load_kernels
+from hybrid.compiler.clocks import clock_arrays
 from hybrid.compiler.parts import EVENTS, FIELDS, SERIES, TANGENT_SERIES, VARIATIONAL
 from hybrid.compiler.surfaces import is_paired
+from hybrid.compiler.tables import Knots, unpacked
 from hybrid.compiler.traced import key_of
 from hybrid.errors import ArgumentError, ModelError
-from hybrid.kernels.types.codes import AT, DESINGULARISED, NARROW, NO_MODE, ROOTED, RUNGE_KUTTA
+from hybrid.kernels.types.codes import DESINGULARISED, NARROW, NO_MODE, ROOTED, RUNGE_KUTTA
 from hybrid.kernels.types.layout import Model, Programs
 from hybrid.system.clocks import At, Every
-from hybrid.system.elements import Transition
 from hybrid.system.functions import CLOCK, CONDITION, ModelFunction
 from hybrid.system.graph import HybridSystem, as_system, functions_of, watched_by
 from hybrid.system.periodicity import period_at, period_fault
@@ -131,7 +131,7 @@ class CompiledSystem:
         self, kernel: str, number: int, index: int, t: float, x: Any, parameters: Any, out: np.ndarray
     ) -> None:
         call = vars(load_kernels("hybrid.kernels.evaluate"))[kernel]
-        model = self._model.replace(parameters=np.array(parameters, dtype=float))
+        model = self._model.replace(parameters=self.with_tables(np.array(parameters, dtype=float)))
         call(model, number, index, float(t), np.array(x, dtype=float), out)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -223,7 +223,8 @@ class CompiledSystem:
         """A model at parameter values."""
         values = self.system.parameter_values(parameters)
         period = self.period_at(values, given=bool(parameters))
-        changes: dict[str, Any] = {"parameters": values, "period": period}
+        changes: dict[str, Any] = {"period": period, **self.knots_at(values)}
+        values = changes["parameters"] = self.with_tables(values)
         if self.emitted.programs.rows:
             changes["programs"] = self._programs.replace(parameters=values)
         found = model.replace(**changes)
@@ -260,8 +261,24 @@ class CompiledSystem:
             checked=_indices(programs.checked),
             numbers=np.array(programs.numbers, dtype=float),
             first=_indices(programs.first),
-            parameters=self.system.parameter_values(),
+            parameters=self.with_tables(self.system.parameter_values()),
         )
+
+    @cached_property
+    def _tables(self) -> np.ndarray:
+        return unpacked(self.emitted.tables)
+
+    @cached_property
+    def _knots(self) -> Knots:
+        return Knots(self.system)
+
+    def with_tables(self, values: np.ndarray) -> np.ndarray:
+        """A parameter vector as kernels get it: with the numbers of the tables behind it."""
+        return np.concatenate([values, self._tables]) if self.emitted.tables else values
+
+    def knots_at(self, values: np.ndarray) -> dict[str, np.ndarray]:
+        """The times at which tables of time have their points, as fields of a model that has any."""
+        return self._knots.at(values) if self.emitted.tables else {}
 
     @cached_property
     def _model(self) -> Any:
@@ -269,27 +286,20 @@ class CompiledSystem:
         transitions = system.transitions
         first_outgoing, outgoing = _leaving(system, at_start=False)
         first_at_start, at_start = _leaving(system, at_start=True)
-        first_clock, clocks = _clocks(system)
         return Model(
             **self.functions(FIELDS),
             **self.functions(EVENTS),
             variational_field=Absent(),
             series=Absent(),
             **self.emitted.arrays(),
-            parameters=system.parameter_values(),
+            parameters=self.with_tables(system.parameter_values()),
+            **{**_no_knots(len(system.modes)), **self.knots_at(system.parameter_values())},
             dimension=system.dimension,
             first_outgoing=first_outgoing,
             outgoing=outgoing,
             first_at_start=first_at_start,
             at_start=at_start,
-            clock=_indices(0 if each.clock is None else each.clock.number for each in transitions),
-            first_clock=first_clock,
-            clocks=clocks,
-            first_tick=_indices(system.first_tick),
-            tick_of=_indices(_first_like(len(transitions), lambda i: _own_name(transitions[i]))),
-            clock_of=_indices(_first_like(len(transitions), self._clock_key)),
-            whole_mode=_indices(system.whole_modes.index(each.part_of or each.name) for each in system.modes),
-            enters=_indices(_enters(system, each) for each in transitions),
+            **clock_arrays(system, self.emitted),
             target=_indices(_index_or_none(system, transition.target) for transition in transitions),
             direction=_indices(transition.guard.direction for transition in transitions),
             programs=self._programs,
@@ -318,13 +328,6 @@ class CompiledSystem:
             tangent_columns=_indices(each.series.tangent_columns for each in self.emitted.propagators),
             period=0.0,
         )
-
-    def _clock_key(self, index: int) -> Any:
-        """The same for two transitions with the same clock."""
-        clock = self.system.transitions[index].clock
-        if clock is None:
-            return index
-        return type(clock), self.emitted.surface[index], clock.quantities if clock.number == AT else ()
 
     @cached_property
     def is_smooth(self) -> bool:
@@ -359,34 +362,6 @@ def _leaving(system: HybridSystem, *, at_start: bool) -> tuple[np.ndarray, np.nd
     return _indices(first), _indices(indices)
 
 
-def _own_name(transition: Transition) -> str:
-    """The name of a transition before its system was split."""
-    return transition.part_of or transition.name
-
-
-def _first_like(count: int, key: Callable[[int], Any]) -> list[int]:
-    """For each of so many items the first one with the same key."""
-    first: dict[Any, int] = {}
-    return [first.setdefault(key(i), i) for i in range(count)]
-
-
-def _enters(system: HybridSystem, transition: Transition) -> bool:
-    """Whether a transition enters its target anew: not if it marks, or leads to another part of its mode."""
-    if transition.target is None or transition.is_marker:
-        return False
-    source, target = map(system.mode_index, (transition.source, transition.target))
-    whole, other = system.modes[source].part_of, system.modes[target].part_of
-    return transition.part_of is not None or whole is None or whole != other
-
-
-def _clocks(system: HybridSystem) -> tuple[np.ndarray, np.ndarray]:
-    """The transitions with clocks that leave each mode: first places, and indices."""
-    pairs = [*enumerate(system.transitions)]
-    of_modes = [[i for i, each in pairs if each.source == name and each.clock] for name in system.mode_names]
-    ends = accumulate(map(len, of_modes), initial=0)
-    return _indices(ends), _indices(chain.from_iterable(of_modes))
-
-
 def _slopes(columns: Sequence[Sequence[Sequence[int]]]) -> dict[str, np.ndarray]:
     """The entries of the Jacobians of all modes: where each row begins and ends, and their columns."""
     rows = [row for of_mode in columns for row in of_mode]
@@ -405,6 +380,12 @@ def _program_runners(needed: bool) -> dict[str, Any]:
 
 def _index_or_none(system: HybridSystem, mode: str | None) -> int:
     return NO_MODE if mode is None else system.mode_index(mode)
+
+
+def _no_knots(modes: int) -> dict[str, np.ndarray]:
+    """The knots of a model without tables in time."""
+    firsts = {"first_group": np.zeros(modes + 1, dtype=np.int64), "first_knot": np.zeros(1, dtype=np.int64)}
+    return {**firsts, **{name: np.empty(0) for name in ("repeat", "knots", "before_knots")}}
 
 
 def _indices(values: Any) -> np.ndarray:

@@ -32,6 +32,7 @@ from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.readers import is_free, readers
 from hybrid.compiler.steep import fields_at_crossings, steep_at_guards, steep_inside
 from hybrid.compiler.surfaces import surfaces
+from hybrid.compiler.tables import Tables
 from hybrid.compiler.traced import Traces, expressions_of, period_of
 from hybrid.compiler.written import Written, beyond_guards, variational
 from hybrid.errors import ModelError
@@ -43,6 +44,7 @@ from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol
 from hybrid.expression.operations import JUMPING
 from hybrid.expression.periodicity import is_periodic
 from hybrid.expression.signs import simplified
+from hybrid.expression.tabulated import Tabulated
 from hybrid.expression.text import text
 from hybrid.expression.tracing import Symbols, TraceError, model_symbols
 from hybrid.system.checks import derivative_has_time_column
@@ -156,9 +158,12 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
     ]
     cancelling = [each for of_mode in residual for each in of_mode]
     not_affine = [None if affine[i] else expression for i, expression in enumerate(traced)]
+    tables = Tables(len(system.parameters))
     return Emitted(
         texts={
-            part: "\n\n".join((IMPORTS, *(function_of_index(name, bodies[name]) for name in names)))
+            part: tables.located(
+                "\n\n".join((IMPORTS, *(function_of_index(name, bodies[name]) for name in names)))
+            )
             for part, names in PARTS.items()
         },
         opaque=writer.opaque,
@@ -169,7 +174,9 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
             [each.expression for each in forcing],
             [*(each.expression for each in cancelling), *(residue_of_guard(g, symbols) for g in traced)],
             symbols,
+            tables,
         ),
+        tables=tables.packed(),
         first_forcing=tuple(accumulate(map(len, pulses), initial=0)),
         forcing_component=tuple(each.component for each in forcing),
         forcing_kind=tuple(each.kind for each in forcing),
@@ -469,6 +476,6 @@ def _is_affine(written: Written, variables: Sequence[Symbol]) -> bool:
     if written.expressions is None or written.jacobian is None:
         return False
     # A floor or a sign has slope zero on both sides of its jumps.
-    jumps = nodes_of(JUMPING, *written.expressions)
+    jumps = nodes_of((*JUMPING, Tabulated), *written.expressions)
     entries = [entry for row in written.jacobian for entry in row[: len(variables)]]
     return is_free(jumps, variables) and is_free(entries, variables)

@@ -167,6 +167,8 @@ class Emitted:
         By mode: how it is best advanced.
     tangent_start
         The first column of tangent vectors in series.
+    tables
+        The numbers of all tables, as text (``hybrid.compiler.tables``).
     opaque
         The model functions that tracing could not follow, by their names in the text; not stored.
     """
@@ -197,6 +199,7 @@ class Emitted:
     crossing: tuple[tuple[int, int], ...]
     propagators: tuple[Propagator, ...]
     tangent_start: int
+    tables: str = ""
     opaque: dict[str, OpaqueFunction] = attrs.field(factory=dict)
 
     def arrays(self) -> dict[str, np.ndarray]:

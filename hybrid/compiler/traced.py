@@ -112,5 +112,5 @@ def _plain(row: Any) -> Any:
         return str(row.value) if row.is_exact else float(row.value).hex()
     if isinstance(row, Symbol):
         return row.label
-    kind, places = row
-    return [kind.__name__, *places]
+    kind, places, attached = row
+    return [kind.__name__, *places, *map(str, attached)]

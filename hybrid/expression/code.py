@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 from hybrid.expression import operations as ops
 from hybrid.expression.graph import nodes
 from hybrid.expression.nodes import TWO, ZERO, Expression, Power, Product, Sum, power, split
+from hybrid.expression.tabulated import Tabulated
 
 IMPORTS = (
     "import numpy as np\n"
@@ -25,6 +26,7 @@ IMPORTS = (
     ")\n"
     "from hybrid.kernels.arithmetic.doubled import divided_dot_product\n"
     "from hybrid.kernels.arithmetic.lanes import four_times, load, store, store_down, store_row\n"
+    "from hybrid.kernels.arithmetic.tables import table\n"
 )
 
 COMPARISONS: dict[type[Expression], str] = {ops.Less: "<", ops.LessEqual: "<=", ops.Equal: "=="}
@@ -232,6 +234,12 @@ class _Printer:
         u = self.name(expression.args[0])
         return f"copysign(abs({u})**{1 / 3!r}, {u})", ATOM
 
+    def _tabulated(self, expression: Tabulated) -> tuple[str, int]:
+        """A call with the table's name in the place of where its numbers begin in ``p``."""
+        pieces, u = expression.pieces, self.text(expression.args[0])
+        sizes = f"{len(pieces.knots)}, {pieces.degree}, {expression.derived}"
+        return f"table(p, {pieces.name}, {sizes}, {u})", ATOM
+
     def _exp2(self, expression: Expression) -> tuple[str, int]:
         return f"2.0**{self.text(expression.args[0], ATOM)}", POWER
 
@@ -257,6 +265,7 @@ class _Printer:
         ops.Remainder: _remainder,
         ops.CubeRoot: _cube_root,
         ops.Exp2: _exp2,
+        Tabulated: _tabulated,
     }
 
 

@@ -58,6 +58,7 @@ from hybrid.expression.operations import (
 from hybrid.expression.polynomials import coefficients_of, expanded, ratio
 from hybrid.expression.ranges import has_one_sign, range_of
 from hybrid.expression.surfaces import moves
+from hybrid.expression.tabulated import Tabulated
 from hybrid.expression.text import text
 
 # Functions that change by their derivatives, other than sums, products and positive powers.
@@ -82,11 +83,11 @@ def jumps_of(field: Iterable[Expression], states: Sequence[Symbol]) -> list[str]
 
 
 def _surfaces(entry: Expression, states: Sequence[Symbol]) -> list[str]:
-    if not contains(entry, (*JUMPS, WholeQuotient)):
+    if not contains(entry, (*JUMPS, Tabulated, WholeQuotient)):
         return []
     quotients = nodes_of(WholeQuotient, entry)
     entry = replaced(entry, {each: Floor(each.args[0] / each.args[1]) for each in quotients})
-    jumps = (node for node in nodes_of(JUMPS, entry) if moves(node, states) and _may_jump(node))
+    jumps = (node for node in nodes_of((*JUMPS, Tabulated), entry) if moves(node, states) and _may_jump(node))
     atoms = sorted(jumps, key=order_of)
     names = {atom: Symbol(f"jump {i}") for i, atom in enumerate(atoms)}
     return [_told(atom) for atom in atoms if not _is_continuous(entry, atom, names)]
@@ -96,6 +97,8 @@ def _may_jump(atom: Expression) -> bool:
     """Whether an atom may have surfaces where it jumps: an angle turns only left of the origin."""
     if isinstance(atom, Atan2) and range_of(atom.args[1]).positive:
         return False
+    if isinstance(atom, Tabulated):
+        return atom.jumps
     surface, _ = _sides(atom, ZERO)
     # The surface of a whole number is one of many, and this is its own.
     return surface is None or isinstance(atom, (*ROUNDING, *REMAINDERS)) or not has_one_sign(surface)
@@ -163,7 +166,7 @@ def _known_side(
     new: Expression,
 ) -> Expression | None:
     """The value of an atom after a substitution, or None if its side is still unknown."""
-    if isinstance(atom, (*ROUNDING, *REMAINDERS, Atan2)):
+    if isinstance(atom, (*ROUNDING, *REMAINDERS, Atan2, Tabulated)):
         return None
     surface, sides = _sides(atom, STEP)
     assert surface is not None, "the kinds of atoms that remain have a surface"
@@ -273,6 +276,8 @@ def _told(atom: Expression) -> str:
     first, *rest = map(text, atom.args)
     if isinstance(atom, ROUNDING):
         return f"{first} is a whole number"
+    if isinstance(atom, Tabulated):
+        return f"{first} is at a point of a table"
     if isinstance(atom, REMAINDERS):
         return f"{first} is a multiple of {rest[0]}"
     if isinstance(atom, Atan2):

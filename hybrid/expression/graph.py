@@ -81,7 +81,8 @@ def listing(expressions: Sequence[Expression]) -> tuple[list[Any], list[int]]:
     rows: list[Any] = []
     for each in in_order(expressions):
         places[each] = len(rows)
-        rows.append((type(each), [places[part] for part in each.args]) if each.args else each)
+        row = type(each), [places[part] for part in each.args], each.attached
+        rows.append(row if each.args else each)
     return rows, [places[each] for each in expressions]
 
 
@@ -89,7 +90,11 @@ def listed(rows: Sequence[Any], places: Sequence[int]) -> tuple[Expression, ...]
     """The expressions of a ``listing``."""
     found: list[Expression] = []
     for row in rows:
-        found.append(row if isinstance(row, Expression) else row[0](*(found[place] for place in row[1])))
+        if isinstance(row, Expression):
+            found.append(row)
+            continue
+        kind, parts, attached = row
+        found.append(kind(*(found[place] for place in parts), *attached))
     return tuple(found[place] for place in places)
 
 

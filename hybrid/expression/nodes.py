@@ -86,6 +86,8 @@ class Expression:
     is_power: ClassVar[bool] = False
     is_exponential: ClassVar[bool] = False
     own_traits: ClassVar[int] = 0
+    # What an operation has besides its arguments.
+    attached: Any = ()
 
     if TYPE_CHECKING:
         # What numbers, symbols, powers and functions have alone: ``is_number`` and its like tell which it is.
@@ -121,7 +123,7 @@ class Expression:
 
     def rebuilt(self, args: Sequence[Expression]) -> Expression:
         """The same operation on other nodes."""
-        return type(self)(*args)
+        return type(self)(*args, *self.attached)
 
     def raised(self, exponent: Number) -> Expression | None:
         """A power of it in simpler terms, if there are any."""
@@ -171,7 +173,7 @@ class Expression:
         return multiply(MINUS_ONE, self)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), self.args
+        return type(self), (*self.args, *self.attached)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(map(repr, self.args))})"

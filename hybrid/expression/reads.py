@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from hybrid.expression.pieces import Pieces
 from hybrid.expression.values import values_of
 from hybrid.system.graph import HybridSystem
 
@@ -22,6 +23,10 @@ class _Names:
     def combined(self, name: str, contents: tuple[frozenset[str], ...]) -> frozenset[str]:
         """The names of all arguments."""
         return frozenset().union(*contents)
+
+    def looked_up(self, pieces: Pieces, content: frozenset[str], derived: int) -> frozenset[str]:
+        """The names of the argument."""
+        return content
 
     def expression(self, content: frozenset[str]) -> frozenset[str]:
         """The names."""

@@ -12,6 +12,8 @@ import attrs
 from hybrid.errors import ModelError
 from hybrid.expression.graph import Group, is_larger_than, nodes
 from hybrid.expression.nodes import Expression, Number, Symbol, number
+from hybrid.expression.pieces import Pieces
+from hybrid.expression.tabulated import Tabulated
 from hybrid.expression.text import text
 from hybrid.expression.ufuncs import RULES
 from hybrid.expression.values import Traced as Traced
@@ -32,6 +34,11 @@ class SymbolicAlgebra:
     def combined(self, name: str, contents: tuple[Expression, ...]) -> Expression:
         """The result of the rule ``name`` for these expressions."""
         made: Expression = RULES[name](*contents)
+        return made
+
+    def looked_up(self, pieces: Pieces, content: Expression, derived: int) -> Expression:
+        """The table as one operation."""
+        made: Expression = Tabulated(content, pieces, derived)
         return made
 
     def expression(self, content: Expression) -> Expression:

@@ -9,7 +9,7 @@ import numpy as np
 
 from hybrid.expression import operations as ops
 from hybrid.expression.nodes import HALF, MINUS_ONE, ONE, TWO, ZERO, Expression, add, multiply, number, power
-from hybrid.expression.values import WHERE
+from hybrid.expression.vocabulary import WHERE
 
 
 def _quotient(a: Expression, b: Expression) -> Expression:

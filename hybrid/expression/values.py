@@ -22,56 +22,19 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 from hybrid.errors import ModelError, shown
 from hybrid.expression.branches import refused_branch
 from hybrid.expression.nodes import Expression
+from hybrid.expression.pieces import Pieces, lines
 from hybrid.expression.text import text
+from hybrid.expression.vocabulary import (
+    BITWISE,
+    CONTRACTIONS,
+    INSTEAD,
+    OF_TRUTHS,
+    REDUCTIONS,
+    TRUTHS,
+    UFUNCS,
+    WHERE,
+)
 from hybrid.system.variables import PARAMETERS, STATE, named_values
-
-# NumPy's universal functions that can be traced; ``hybrid.expression.ufuncs`` has a rule for each.
-UFUNCS = frozenset(
-    {
-        "add", "subtract", "multiply", "divide", "floor_divide", "remainder", "fmod", "power", "float_power",
-        "negative", "positive", "absolute", "fabs", "sign", "square", "reciprocal", "sqrt", "cbrt", "exp",
-        "exp2", "expm1", "log", "log2", "log10", "log1p", "sin", "cos", "tan", "arcsin", "arccos", "arctan",
-        "arctan2", "sinh", "cosh", "tanh", "arcsinh", "arccosh", "arctanh", "hypot", "deg2rad", "radians",
-        "rad2deg", "degrees", "floor", "ceil", "trunc", "maximum", "minimum", "fmax", "fmin", "clip",
-        "heaviside", "less", "less_equal", "greater", "greater_equal", "equal", "not_equal", "logical_and",
-        "logical_or", "logical_xor", "logical_not", "conjugate",
-    }
-)  # fmt: skip
-# Those that give booleans, whatever their arguments.
-TRUTHS = frozenset(
-    {
-        "less", "less_equal", "greater", "greater_equal", "equal", "not_equal", "logical_and", "logical_or",
-        "logical_xor", "logical_not",
-    }
-)  # fmt: skip
-# Name of np.where in an algebra.
-WHERE = "where"
-# What NumPy's functions do with booleans alone: True + True is True.
-OF_TRUTHS = {
-    "add": "logical_or", "multiply": "logical_and", "maximum": "logical_or", "minimum": "logical_and",
-    "fmax": "logical_or", "fmin": "logical_and", "bitwise_and": "logical_and", "bitwise_or": "logical_or",
-    "bitwise_xor": "logical_xor", "invert": "logical_not",
-}  # fmt: skip
-BITWISE = frozenset({"bitwise_and", "bitwise_or", "bitwise_xor", "invert"})
-# These count booleans.
-REDUCTIONS = ("reduce", "accumulate", "reduceat")
-# What to write in place of functions that cannot be traced.
-INSTEAD = {
-    "rint": "np.floor(x + 0.5)",
-    "round": "np.floor(x + 0.5)",
-    "logaddexp": "np.log(np.exp(a) + np.exp(b))",
-    "logaddexp2": "np.log2(np.exp2(a) + np.exp2(b))",
-    "copysign": "np.abs(a)*np.sign(b)",
-    "signbit": "x < 0",
-    "modf": "np.trunc(x) and x - np.trunc(x)",
-    "ldexp": "a*2.0**b",
-    "sinc": "np.sin(np.pi*x)/(np.pi*x)",
-    "interp": "a sum of pieces, each a slope times np.clip(x, begin, end)",
-    "angle": "np.arctan2(y, x)",
-    "sort": "np.minimum(a, b) and np.maximum(a, b)",
-}
-# These form sums of products, which NumPy does on object arrays with the operators of the scalars.
-CONTRACTIONS = ("matmul", "vecdot", "matvec", "vecmat")
 
 
 class Algebra(Protocol):
@@ -83,6 +46,10 @@ class Algebra(Protocol):
 
     def combined(self, name: str, contents: tuple[Any, ...]) -> Any:
         """Content of the result of a function in ``UFUNCS``, or of ``WHERE``."""
+        ...
+
+    def looked_up(self, pieces: Pieces, content: Any, derived: int) -> Any:
+        """Content of the value of a table, or of a derivative of some order."""
         ...
 
     def expression(self, content: Any) -> Any:
@@ -123,6 +90,7 @@ NEEDS_NUMBER = (
 NEEDS_WHOLE_NUMBER = "a whole number is needed where tracing has a symbol: use"
 NEEDS_FLOATS = "an array of floats cannot take symbols: use np.zeros_like(x) in place of np.zeros"
 NEEDS_CHOICE = "a condition as an index cannot be traced: write np.where(x > 0, x, 0) in place of x[x > 0]"
+NEEDS_TABLE = "a spline of SciPy needs a number: call hybrid.Table(spline), made once, in its place"
 NEEDS_COPY = "it writes into its argument: take a copy first, x = x.copy()"
 
 
@@ -192,7 +160,8 @@ class Traced(NDArrayOperatorsMixin):
         raise refusal(refused_branch(sys._getframe(1)))
 
     def __float__(self) -> float:
-        raise refusal(NEEDS_NUMBER)
+        module = str(sys._getframe(1).f_globals.get("__name__"))
+        raise refusal(NEEDS_TABLE if module.startswith("scipy.interpolate") else NEEDS_NUMBER)
 
     def __int__(self) -> int:
         raise refusal(f"{NEEDS_WHOLE_NUMBER} np.trunc(x)")
@@ -391,6 +360,38 @@ def _clipped(a: Any, a_min: Any = None, a_max: Any = None, **bounds: Any) -> Any
     return a if high is None else np.minimum(a, high)
 
 
+def looked_up(pieces: Pieces, u: Any, derived: int = 0) -> Any:
+    """The values of a table, or of a derivative, at numbers or traced numbers of any shape."""
+    if not is_traced(u):
+        return pieces.at(u, derived)
+
+    def value(each: Any) -> Traced:
+        return Traced(_ALGEBRA.get().looked_up(pieces, _content(each), derived))
+
+    return _wrapped(np.frompyfunc(value, 1, 1)(_plain(u)))
+
+
+def is_traced(value: Any) -> bool:
+    """Whether a value is a traced number, or has any as items."""
+    if isinstance(value, list | tuple):
+        return any(type(each) is Traced or isinstance(each, TracedArray) for each in value)
+    return type(value) is Traced or isinstance(value, TracedArray)
+
+
+def _interpolated(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, period: Any = None) -> Any:
+    """``np.interp``: a table of constant points."""
+    try:
+        points, values = (np.asarray(each, dtype=float) for each in (xp, fp))
+        left, right = (None if each is None else float(each) for each in (left, right))
+    except TraceError:
+        raise refusal("np.interp needs points that are numbers: add up pieces with np.clip") from None
+    if period is not None:
+        raise refusal("np.interp with period= cannot be traced: write np.interp(np.mod(t, T), times, values)")
+    if points.shape != values.shape or points.ndim != 1 or not (points.size and np.all(np.diff(points) > 0)):
+        raise refusal("np.interp can be traced only for points that increase")
+    return looked_up(lines(points, values, left, right), x)
+
+
 def _select(conditions: Any, choices: Any, default: Any = 0) -> Any:
     if len(conditions) != len(choices):
         raise refusal("np.select needs one choice per condition")
@@ -419,6 +420,7 @@ FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.clip: _clipped,
     np.select: _select,
     np.piecewise: _piecewise,
+    np.interp: _interpolated,
 }
 
 

@@ -4,7 +4,8 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.clock import forward, set_clock, time_left
+from hybrid.kernels.arithmetic.clock import forward, set_clock, time_before, time_left, time_until
+from hybrid.kernels.arithmetic.tables import knots_passed
 from hybrid.kernels.events.clocks import (
     go_to_tick,
     has_clocks,
@@ -21,6 +22,7 @@ from hybrid.kernels.limit.go import may_accumulate
 from hybrid.kernels.steps.field.jumps import leave
 from hybrid.kernels.steps.field.late import is_late
 from hybrid.kernels.steps.series import series_step
+from hybrid.kernels.steps.step import rates_by_jacobian
 from hybrid.kernels.types.codes import (
     ACCUMULATION,
     DONE,
@@ -42,7 +44,7 @@ from hybrid.kernels.types.codes import (
     TERMINAL,
 )
 from hybrid.kernels.types.kinds import INTEGER, REAL
-from hybrid.kernels.types.layout import Parts, Task
+from hybrid.kernels.types.layout import EPSILON, Parts, Task
 from hybrid.kernels.types.options import KERNEL, exported
 
 # More jumps than this at one instant, in total or per transition, count as endless.
@@ -52,6 +54,8 @@ MOST_JUMPS_EACH = 100
 # component. A run whose state is at rest, and that needs more than 10^7 such steps, does not get on.
 OF_TIME = 1e-3
 OF_STATE = 1e-4
+# The time of a point of a table that repeats is rounded where whole periods are added.
+ROUNDING_OF_KNOT = 4.0 * EPSILON
 # A landing may be this many times as far from its guard as the rounding of the state.
 MOST_ROUNDING = 64.0
 
@@ -238,13 +242,77 @@ def fires_at_tick(parts, task, stop_cycle, stop_phase):
     return clock
 
 
+@njit(**KERNEL)
+def next_knot(model, run):
+    """The next time at which a table of the mode has a point, and the last moment before it.
+
+    Both are infinite if no point is left. The times of tables that repeat are known up to rounding.
+    """
+    last, knot = math.inf, math.inf
+    for group in range(model.first_group[run.mode], model.first_group[run.mode + 1]):
+        repeat, first, stop = model.repeat[group], model.first_knot[group], model.first_knot[group + 1]
+        within = run.phase % repeat if repeat > 0.0 else run.phase
+        place = first + knots_passed(model.knots, first, stop, within)
+        if place == stop:
+            continue
+        at, before = model.knots[place], model.before_knots[place]
+        if repeat > 0.0:
+            middle = run.phase - within + at
+            apart = ROUNDING_OF_KNOT * abs(middle)
+            at, before = middle + apart, middle - apart
+        if at < knot:
+            last, knot = before, at
+    return last, knot
+
+
+@njit(**KERNEL)
+def room_before_knot(model, run, remaining):
+    """How long the next step may be, which ends at the last moment before the next knot; and that knot."""
+    last, knot = next_knot(model, run)
+    return (min(time_before(run.phase, last), remaining) if last < math.inf else remaining), knot
+
+
+@njit(**KERNEL)
+def pass_knot(task, knot):
+    """Move a run from the last moment before a knot to the knot, from which the piece behind it holds.
+
+    No step looks at the knot itself, so the moment before belongs to the piece that ends there.
+    """
+    model, run, out = task.model, task.run, task.work.error
+    gap = time_until(run, knot)
+    rates_by_jacobian(model, run.mode, run.phase, run.y, task.tangents, task.work.jacobian, out)
+    for i in range(model.dimension * (1 + task.tangents)):
+        run.y[i] += gap * out[i]
+    run.since_entry += gap
+    set_clock(run, run.cycle, knot)
+    forward(run, model.period, 0.0)
+    run.last_step = 0.0
+    run.stage = STALE
+
+
+@njit(**KERNEL)
+def go_forward(model, run, span):
+    """Count the time of a step."""
+    forward(run, model.period, span)
+    run.since_entry += span
+    run.longest_step = max(run.longest_step, span)
+
+
+@njit(**KERNEL)
+def meet(task, clock, knot, at_knot):
+    """Set the clock of a run whose step has ended at the tick of a clock, or before a knot."""
+    if at_knot:
+        pass_knot(task, knot)
+    else:
+        go_to_tick(task.model, task.run, clock)
+
+
 @exported(INTEGER, Parts, Task, INTEGER, REAL, INTEGER, INTEGER)
 def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
     """Advance a run to the time ``stop_cycle`` periods and ``stop_phase``; returns a code.
 
-    The run can be taken up again from any code that is not an error: after ``RECORD_FULL`` once the record
-    has been emptied, after ``MAX_STEPS`` and ``MAX_JUMPS`` with larger limits. After ``INCOMPLETE`` it is in
-    the middle of a jump, and has to begin again where this call began, with all parts. Nothing is allocated.
+    The run can be taken up again after ``RECORD_FULL`` once the record has been emptied, after ``MAX_STEPS``
+    and ``MAX_JUMPS`` with larger limits; after ``INCOMPLETE`` where this call began, with all parts.
     """
     model, run = task.model, task.run
     if run.horizon == 0.0 and run.steps == 0:
@@ -259,15 +327,12 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
             code = enter(parts, task)
             if code != GO_ON:
                 return code
-            if run.stage == ENTERING or run.pending != NO_TRANSITION:
-                continue
+            continue
         remaining = time_left(model, run, stop_cycle, stop_phase)
-        clock, tick, band = NO_TRANSITION, math.inf, 0.0
-        if has_clocks(model, run.mode):
-            clock, tick, band = next_tick(model, run)
-            if tick <= band:
-                run.pending = fires_at_tick(parts, task, stop_cycle, stop_phase)
-                continue
+        clock, tick, band = next_tick(model, run)
+        if tick <= band:
+            run.pending = fires_at_tick(parts, task, stop_cycle, stop_phase)
+            continue
         if remaining <= 0.0:
             fired = parts.arrived(task)
             if fired == NO_TRANSITION:
@@ -278,28 +343,28 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
             return RECORD_FULL
         if run.steps >= max_steps:
             return MAX_STEPS
-        mode = run.mode
         # A tick that is as good as at the end is there.
         until = remaining if tick + band >= remaining else tick
-        code, span = step(parts, task, until)
+        room, knot = room_before_knot(model, run, until)
+        if not room > 0.0:
+            pass_knot(task, knot)
+            continue
+        code, span = step(parts, task, room)
         if code != GO_ON:
             return int(code)
         if run.pending != NO_TRANSITION:
             begin_stretch(model, run, remaining)
         elif not gets_on(model, task.method, run, remaining):
             return STEP_TOO_SMALL
-        forward(run, model.period, span)
-        run.since_entry += span
-        run.longest_step = max(run.longest_step, span)
-        if model.timed[mode] == 1 and is_late(task.method, run):
+        go_forward(model, run, span)
+        if model.timed[run.mode] == 1 and is_late(task.method, run):
             parts.late_step(model, task.method, run, span, task.work)
         if task.tangents > 0 and task.orthonormal != 0 and 0.0 < span < remaining:
-            parts.keep_apart(model, run, mode, task.tangents, task.work.jacobian)
+            parts.keep_apart(model, run, run.mode, task.tangents, task.work.jacobian)
         fired = run.pending
-        if span > until or (span >= until and fired == NO_TRANSITION):
-            if until < remaining:
-                go_to_tick(model, run, clock)
-            else:
-                set_clock(run, stop_cycle, stop_phase)
+        if span > remaining or (span >= remaining and fired == NO_TRANSITION):
+            set_clock(run, stop_cycle, stop_phase)
+        elif span >= room and fired == NO_TRANSITION:
+            meet(task, clock, knot, room < until)
         if fired != NO_TRANSITION:
             run.pending = parts.first_in_order(task, fired, stop_cycle, stop_phase)

@@ -111,7 +111,7 @@ def _run_dry(trajectory: Trajectory, code: int) -> Iterator[str]:
             if transition.source != trajectory.mode or run.on_guard[index] > 0:
                 continue
             guard = guard_function(transition)
-            parameters = trajectory.model.parameters
+            parameters = trajectory.parameters
             [value] = trajectory.compiled.value(guard, index, run.phase, trajectory.x, parameters)
             if abs(value) <= atol:
                 yield (

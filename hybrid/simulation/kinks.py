@@ -26,7 +26,8 @@ def move_alike(system: HybridSystem, model: Any, run: Any, modes: list[str]) -> 
     A state in the wrong one of two such modes passes to the other without a change as soon as it moves. Where
     fields agree at the start alone (a two-fold), each mode may lead elsewhere.
     """
-    start = _Start(system, np.array(model.parameters), float(run.phase), np.array(run.y[: system.dimension]))
+    own = np.array(model.parameters[: len(system.parameters)])
+    start = _Start(system, own, float(run.phase), np.array(run.y[: system.dimension]))
     met: set[str | None] = {*modes[:1]}
     for _ in modes:
         for transition, on_guard in zip(system.transitions, run.on_guard, strict=True):

@@ -83,13 +83,19 @@ class Memory:
         np.abs(state, out=run.scale)
         return float(run.phase)
 
-    def model_at(self, values: np.ndarray, period: float) -> Any:
-        """The plan's model at a parameter vector; it is changed when another run takes this memory."""
+    def model_at(self, values: np.ndarray, period: float, knots: dict[str, np.ndarray]) -> Any:
+        """The plan's model at a parameter vector; it is changed when another run takes this memory.
+
+        ``knots`` are those of ``CompiledSystem.knots_at``.
+        """
         if self._model is None:
-            model, own = self.plan.model, np.empty_like(values)
+            model, own = self.plan.model, self.plan.model.parameters.copy()
             changes = {"programs": model.programs.replace(parameters=own)} if len(model.programs.rows) else {}
+            changes |= {name: each.copy() for name, each in knots.items()}
             self._model = model.replace(parameters=own, **changes)
-        self._model.parameters[:] = values
+        self._model.parameters[: len(values)] = values
+        for name, each in knots.items():
+            getattr(self._model, name)[:] = each
         self._model.put(period=period)
         return self._model
 

@@ -197,7 +197,7 @@ class _Recorder:
                         code = StatusCode.OUT_OF_MEMORY
                     else:
                         code = self._advance(t1, max_jumps)
-        model, system = trajectory.model, trajectory.system
+        system = trajectory.system
         jumps = self._jumps()
         t_end = t1 if code == codes.DONE else trajectory.t
         end = (t_end, trajectory.x, run.mode)
@@ -212,7 +212,7 @@ class _Recorder:
             mode, j = self.places[:, : self.sampled]
         return HybridArc(
             system,
-            dict(zip(system.variables.parameter_names, model.parameters.tolist(), strict=True)),
+            dict(zip(system.variables.parameter_names, trajectory.parameters.tolist(), strict=True)),
             t,
             j,
             x,
@@ -234,7 +234,7 @@ class _Recorder:
             return None
         model = self.trajectory.model
         columns: Any = join(self.jumps) if self.jumps else _no_jumps(model.dimension)
-        return Jumps(self.trajectory.system, model.parameters, model.period, *columns)
+        return Jumps(self.trajectory.system, self.trajectory.parameters, model.period, *columns)
 
     def _advance(self, t1: float, max_jumps: int) -> int:
         """Run until the record is full or the run ends; the code."""

@@ -80,8 +80,8 @@ class Common:
 
     def begin_at(self, state: np.ndarray, mode: str | None, values: np.ndarray) -> Trajectory:
         """A trajectory at its start, at a parameter vector."""
-        period = self.compiled.period_at(values)
-        return self.begin(state, mode, lambda plan, memory: memory.model_at(values, period))
+        period, knots = self.compiled.period_at(values), self.compiled.knots_at(values)
+        return self.begin(state, mode, lambda plan, memory: memory.model_at(values, period, knots))
 
     def begin(
         self, state: np.ndarray, mode: str | None, model_of: Callable[[Plan, Memory], Any]
@@ -137,6 +137,12 @@ class Trajectory:
     phase0: float
     beyond: tuple[str, ...] = ()
     stop: Stop = CTRL_C
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """The values of the parameters; in the model, the numbers of tables lie behind them."""
+        values: np.ndarray = self.model.parameters[: len(self.system.parameters)]
+        return values
 
     @property
     def run(self) -> Any:

@@ -398,7 +398,9 @@ class HybridSystem(Portable):
 
 def ticks_of(system: HybridSystem, x: np.ndarray, parameters: np.ndarray) -> list[float]:
     """The numbers of all clocks at a state and parameters; ArgumentError if one cannot be."""
-    view, p = system.variables.state_view(x), system.variables.parameter_view(parameters.tolist())
+    # The numbers of tables are behind the parameters.
+    own = parameters[: len(system.parameters)].tolist()
+    view, p = system.variables.state_view(x), system.variables.parameter_view(own)
     found: list[float] = []
     for transition in system.transitions:
         clock = transition.clock

@@ -12,7 +12,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from hybrid.expression.values import TRUTHS, WHERE, values_of
+from hybrid.expression.values import values_of
+from hybrid.expression.vocabulary import TRUTHS, WHERE
 from hybrid.system.functions import CONDITION
 from hybrid.system.graph import HybridSystem, as_system, functions_of
 from hybrid.system.watched import is_of_library
@@ -129,6 +130,10 @@ class UnitAlgebra:
                 return self.number(getattr(np, name)(*literals))
         names = dict.fromkeys(each for content in contents for each in content.names)
         return attrs.evolve(self._result(name, contents), names=tuple(names)[:MOST_NAMES])
+
+    def looked_up(self, pieces: Any, content: Quantity, derived: int) -> Quantity:
+        """The unit of a table's values is not known."""
+        return Quantity(None)
 
     def _result(self, name: str, contents: tuple[Quantity, ...]) -> Quantity:
         pure, first = Quantity(unit_of("")), contents[0]

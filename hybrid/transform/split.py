@@ -98,7 +98,8 @@ def split(system: HybridSystem) -> HybridSystem:
     ------
     ModelError
         If a field cannot be traced, or a reset into a mode that is split cannot. If a branch is written with
-        Python's ``if``, the message shows the ``np.where`` to write.
+        Python's ``if``, the message shows the ``np.where`` to write. If a `Table` jumps in the state; other
+        tables are left as they are.
 
     Notes
     -----

@@ -19,6 +19,7 @@ from hybrid.expression.nodes import ZERO, Expression, Symbol
 from hybrid.expression.operations import And, Less, LessEqual, Not, Or
 from hybrid.expression.surfaces import Surfaces
 from hybrid.expression.switches import Resolved, Switches
+from hybrid.expression.tabulated import check_tables
 from hybrid.expression.tracing import TraceError, model_symbols, trace
 from hybrid.system.clocks import Clock
 from hybrid.system.derivatives import evaluate, sample_points
@@ -208,11 +209,12 @@ class Splitter:
 
     def _traced(self, what: str, function: Function) -> list[Expression]:
         try:
-            return trace(function, self.variables.components, self.variables.parameter_names)
+            found = trace(function, self.variables.components, self.variables.parameter_names)
         except TraceError as error:
-            raise ModelError(
-                f"split: {what} cannot be traced, so its kinks and jumps cannot be found: {error}."
-            ) from error
+            why = f"split: {what} cannot be traced, so its kinks and jumps cannot be found: {error}."
+            raise ModelError(why) from error
+        check_tables(f"split: {what}", found, self.symbols.x)
+        return found
 
     def _pieces(self, index: int, mode: Mode) -> Pieces:
         field = self._traced(f"the field of mode {mode.name!r}", field_function(mode, self.variables).value)
@@ -224,15 +226,13 @@ class Splitter:
         return Pieces(index, field, watched, self.variables, self.surfaces)
 
     def _guard(self, transition: Transition) -> Expression | None:
-        if transition.clock is not None:
-            return None
         try:
-            [guard] = trace(
+            found = trace(
                 transition.guard.function, self.variables.components, self.variables.parameter_names
             )
         except TraceError:
             return None
-        return guard
+        return None if transition.clock else found[0]
 
     def _reset(self, transition: Transition) -> list[Expression] | None:
         if transition.reset is None:

@@ -59,6 +59,7 @@ from hybrid.expression.operations import (
     TruncatedRemainder,
 )
 from hybrid.expression.signs import simplified
+from hybrid.expression.tabulated import Tabulated, has_knots_in_time
 from hybrid.expression.tracing import Symbols
 from hybrid.kernels.types.codes import ARGUMENTS, IN_TIME, TERMS
 
@@ -192,7 +193,9 @@ def arguments_of(expression: Expression, variables: tuple[Symbol, ...]) -> list[
 
 def _own_arguments(node: Expression, variables: tuple[Symbol, ...]) -> Iterator[Expression]:
     """The arguments of one node, if it is an exponential, a kink or a jump."""
-    if isinstance(node, Tanh):
+    if isinstance(node, Tabulated):
+        yield APART * node.number_of_piece
+    elif isinstance(node, Tanh):
         # Far from its switch it is a constant, however much its argument changes.
         yield Maximum(Minimum(node.args[0], number(FLAT)), number(-FLAT))
     elif isinstance(node, EXPONENTIAL):
@@ -343,6 +346,9 @@ def _factors(node: Expression, times: tuple[Symbol, ...]) -> int | None:
         return None if factors is None else factors * node.exponent.value
     if node.is_power and mentions(node.base, times):
         return None
+    if isinstance(node, Tabulated):
+        # Its knots end steps.
+        return node.pieces.degree if has_knots_in_time(node) else None
     # The degree is that of a polynomial: a zero derivative would not prove that the argument has no jumps.
     degree = degree_of(node.exponent if node.is_power else node.args[0], frozenset(times))
     if degree is None:

@@ -13,9 +13,11 @@ from typing import ClassVar
 
 from hybrid.compiler.bounds.forcing import is_harmless
 from hybrid.compiler.emitted import Programs
+from hybrid.compiler.tables import Tables
 from hybrid.expression.graph import is_negative
 from hybrid.expression.nodes import HALF, Expression, Number, Product, Sum
 from hybrid.expression.operations import Remainder, Several, TruncatedRemainder
+from hybrid.expression.tabulated import Tabulated
 from hybrid.expression.tracing import Symbols
 from hybrid.kernels.arithmetic import operations as op
 
@@ -29,11 +31,13 @@ def programs(
     forcings: Sequence[Expression | None],
     residues: Sequence[Expression | None],
     symbols: Symbols,
+    tables: Tables | None = None,
 ) -> Programs:
     """Programs of the guards' expressions, followed by those of the forcings and of the residues.
 
     Where the expression is None or has no interval arithmetic, the program has no rows.
     """
+    tables = Tables(len(symbols.p)) if tables is None else tables
     rows: list[tuple[int, int, int, int]] = []
     checked: list[int] = []
     numbers: dict[float, int] = {}
@@ -41,7 +45,7 @@ def programs(
     pulses = range(len(guards), len(guards) + len(forcings))
     for place, expression in enumerate([*guards, *forcings, *residues]):
         if expression is not None:
-            writer = _Writer(symbols, numbers)
+            writer = _Writer(symbols, numbers, tables)
             with suppress(NoProgram):
                 rows += writer.written(expression)
                 checked += writer.checked() if place in pulses else [0] * len(writer.rows)
@@ -52,8 +56,8 @@ def programs(
 class _Writer:
     """Writes the rows of one expression; a subexpression that occurs twice has one row."""
 
-    def __init__(self, symbols: Symbols, numbers: dict[float, int]) -> None:
-        self.numbers = numbers
+    def __init__(self, symbols: Symbols, numbers: dict[float, int], tables: Tables) -> None:
+        self.numbers, self.tables = numbers, tables
         self.rows: list[tuple[int, int, int, int]] = []
         self.places: dict[Expression, int] = {}
         self.times = (symbols.t, *symbols.x)
@@ -111,6 +115,9 @@ class _Writer:
             return self._number(float(expression))
         if expression.is_power:
             return self._power(*expression.args)
+        if isinstance(expression, Tabulated):
+            first = self.tables.place(expression.pieces)
+            return self._add(op.TABLE, self.place(expression.args[0]), first, expression.derived)
         kind, arguments = type(expression), expression.args
         if kind in self.RULES:
             return self.RULES[kind](self, *arguments)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from math import perm
 from typing import Any
 
 import attrs
@@ -20,7 +21,7 @@ from hybrid.kernels.instructions.columns import (
 )
 from hybrid.kernels.instructions.loops import declared
 from hybrid.kernels.instructions.registers import everywhere, read, write, write_down, write_row
-from hybrid.kernels.types.codes import NARROW
+from hybrid.kernels.types.codes import HEAD, NARROW
 
 NUMBER = ir.DoubleType()
 WHOLE = ir.IntType(64)
@@ -96,6 +97,33 @@ def _spread(builder: Any, y: Any, n: int, matrix: Any, first: Any, stride: Any) 
     write_spread(builder, y.data, y.length, n, matrix, first, stride)
 
 
+def _table(builder: Any, p: Any, first: int, count: int, degree: int, order: int, u: Any) -> Any:
+    """The piece by halving, without branches, then Horner's scheme."""
+
+    def entry(place: Any, behind: int) -> Any:
+        index = builder.add(place, WHOLE(first + behind))
+        return builder.load(builder.gep(p.data, [index], source_etype=NUMBER), typ=NUMBER)
+
+    def passes(place: Any, behind: int) -> Any:
+        return builder.fcmp_ordered("<=", entry(place, HEAD + behind), u)
+
+    passed, left = WHOLE(0), count
+    while left > 1:
+        half = left // 2
+        further = builder.add(passed, WHOLE(half))
+        passed = builder.select(passes(passed, half - 1), further, passed)
+        left -= half
+    passed = builder.select(passes(passed, 0), builder.add(passed, WHOLE(1)), passed)
+    before = builder.select(builder.icmp_signed(">", passed, WHOLE(0)), passed, WHOLE(1))
+    away = builder.fsub(u, entry(before, HEAD - 1))
+    row = builder.mul(passed, WHOLE(degree + 1))
+    total = None
+    for k in range(degree, order - 1, -1):
+        term = builder.fmul(NUMBER(float(perm(k, order))), entry(row, HEAD + count + k))
+        total = term if total is None else builder.fadd(builder.fmul(total, away), term)
+    return total
+
+
 IN_LIBM = (
     "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cosh", "expm1", "hypot", "log1p", "sinh",
     "tan", "tanh",
@@ -114,6 +142,7 @@ CALLS = {
     "store": Call(_store),
     "store_down": Call(write_down),
     "store_row": Call(write_row),
+    "table": Call(_table, known=(1, 2, 3, 4)),
     "four_times": Call(lambda builder, number: everywhere(builder, number, NARROW)),
     "convolve": Call(write_convolution, known=(5, 6)),
     "convolve_pairs": Call(partial(write_convolution, pairs=True), known=(5, 6)),

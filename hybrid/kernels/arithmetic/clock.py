@@ -9,6 +9,7 @@ import math
 
 from numba import njit
 
+from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Factor that splits a number into an upper and a lower half of its digits.
@@ -44,6 +45,21 @@ def time_left(model, run, stop_cycle, stop_phase):
         return stop_phase
     left, lost = sum_in_two_parts(stop_phase, -run.phase)
     return (stop_cycle - run.cycle) * model.period + (left + (lost - run.phase_low))
+
+
+@njit(**IN_ORDER)
+def time_until(run, phase):
+    """Time until a phase of the current period."""
+    return (phase - run.phase) - run.phase_low
+
+
+@njit(**IN_ORDER)
+def time_before(t, last):
+    """The longest time from ``t`` on that does not lead beyond ``last``, rounding included."""
+    h = last - t
+    while t + h > last:
+        h *= 1.0 - EPSILON
+    return h
 
 
 @njit(**IN_ORDER)

@@ -29,6 +29,9 @@ OR = 16
 # ``b`` if ``a`` holds, else ``c``.
 SELECT = 17
 
+# The table whose numbers begin at ``b`` behind the parameters; ``c`` is the order of its derivative.
+TABLE = 18
+
 # Functions of one operand.
 EXP = 20
 LOG = 21

@@ -26,6 +26,7 @@ from hybrid.kernels.arithmetic.intervals import (
     truth,
     whole_power,
 )
+from hybrid.kernels.arithmetic.tables import table_bounds
 from hybrid.kernels.types.codes import HIGH, HIGH_MIDDLE, LEAST_SLOPE, LOW, LOW_MIDDLE, MOST_SLOPE
 from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL, VECTOR
 from hybrid.kernels.types.layout import EPSILON, Path, Programs
@@ -261,6 +262,17 @@ def _bound_binary(code, row, a, b):
 
 
 @njit(**KERNEL)
+def _bound_table(programs, place, row, a):
+    data, first, order = programs.parameters, programs.rows[place, 2], programs.rows[place, 3]
+    row[LOW], row[HIGH], jumps = table_bounds(data, first, order, a[LOW], a[HIGH])
+    row[LOW_MIDDLE], row[HIGH_MIDDLE], _ = table_bounds(data, first, order, a[LOW_MIDDLE], a[HIGH_MIDDLE])
+    least, most, _ = table_bounds(data, first, order + 1, a[LOW], a[HIGH])
+    if jumps:
+        least, most = -math.inf, math.inf
+    row[LEAST_SLOPE], row[MOST_SLOPE] = product(least, most, a[LEAST_SLOPE], a[MOST_SLOPE])
+
+
+@njit(**KERNEL)
 def _run(programs, transition, registers, radius):
     """Run the operations of a guard's program, whose leaves are set; returns the index of its last row."""
     first, stop = programs.first[transition], programs.first[transition + 1]
@@ -271,6 +283,8 @@ def _run(programs, transition, registers, radius):
             a = registers[programs.rows[place, 1]]
             if code >= op.EXP:
                 _bound_function(code, row, a)
+            elif code == op.TABLE:
+                _bound_table(programs, place, row, a)
             elif code == op.WHOLE_POWER:
                 _bound_whole_power(row, a, programs.rows[place, 2])
             elif code == op.FIXED_POWER:

@@ -95,3 +95,6 @@ REGISTERS = 6
 IN_TIME, TERMS, ARGUMENTS = range(3)
 # No limit to a count.
 UNLIMITED = 9223372036854775807
+
+# Where the knots of a table begin in its numbers: behind the number of knots and the degree.
+HEAD = 2

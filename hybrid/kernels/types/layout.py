@@ -101,6 +101,10 @@ class Model(Structure):
     ``conditional`` for a mode that is left under conditions.
     ``tangent_start`` is the first column of tangent vectors in series, ``tangent_columns`` how many four of
     them have in each mode. ``period`` is 0 without a forcing period.
+    The times at which tables in mode ``m`` have their points, which end steps, come in the groups
+    ``first_group[m]`` to ``first_group[m + 1]``: ``knots[first_knot[g]:first_knot[g + 1]]``, which come again
+    after ``repeat[g]`` unless that is 0. ``before_knots`` are the floating-point numbers before them.
+    ``parameters`` go on behind the parameters themselves: there the numbers of the tables are.
     """
 
     field: VECTOR_FUNCTION
@@ -162,6 +166,11 @@ class Model(Structure):
     tangent_start: INTEGER
     tangent_columns: INDICES
     period: REAL
+    first_group: INDICES
+    repeat: VECTOR
+    first_knot: INDICES
+    knots: VECTOR
+    before_knots: VECTOR
 
 
 class Method(Structure):

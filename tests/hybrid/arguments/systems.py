@@ -15,6 +15,7 @@ from tests.hybrid.arguments.values import (
     LIMIT,
     LIST,
     NAME,
+    NUMBERS,
     QUANTITY,
     SYSTEM,
     TEXT,
@@ -34,6 +35,15 @@ def systems():
     return [
         (call(hybrid.compile_system, BALL), {"system": SYSTEM}),
         (call(hybrid.split, BALL), {"system": SYSTEM}),
+        (
+            call(hybrid.Table, [0.0, 1.0], [2.0, 3.0]),
+            {
+                "x": [*NUMBERS, [0.0], [1.0, 0.0], [0.0, 0.0], [0.0, math.inf], [[0.0, 1.0]]],
+                "y": [*NUMBERS, [2.0], [2.0, math.nan], [[2.0, 3.0]]],
+                "kind": [None, 3, "spline", ["linear"], Odd()],
+            },
+        ),
+        (call(hybrid.Table.__call__, hybrid.Table([0.0, 1.0], [2.0, 3.0]), 0.5), {"u": NUMBERS}),
         (
             call(hybrid.from_equations, lambda t, x, p: (x.v, -np.abs(x.q)), state=("q", "v")),
             {

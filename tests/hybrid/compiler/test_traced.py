@@ -17,7 +17,7 @@ from hybrid.compiler.compiled import emitted_of
 from hybrid.compiler.emit import emit
 from hybrid.compiler.traced import key_of
 from hybrid.expression.ufuncs import RULES
-from hybrid.expression.values import UFUNCS, WHERE
+from hybrid.expression.vocabulary import UFUNCS, WHERE
 
 MODELS = [
     models.ball_chain,

@@ -316,6 +316,21 @@ def test_multipliers_of_a_switched_coil():
     assert orbit.multipliers[0] == pytest.approx(E(-0.05), rel=1e-12)
 
 
+def test_a_clock_beside_a_table():
+    """Steps end at knots and at ticks, also where both are at one time."""
+    rate = hybrid.Table([0.0, 1.0, 2.5, 4.0], [0.0, 2.0, 1.0, 3.0], kind="step")
+    system = HybridSystem(
+        state=("q", "n"),
+        modes=[Mode("m", lambda t, x, p: (rate(t), 0.0))],
+        transitions=[Transition("m", "m", Every(0.5), Reset(lambda t, x, p: {"n": x.n + x.q}))],
+    )
+    arc = hybrid.simulate(system, (0.0, 0.0), (0.0, 4.0), tangent=True)
+    amounts = [2.0 * (min(t, 2.5) - 1.0) * (t > 1.0) + max(t - 2.5, 0.0) for t in 0.5 * np.arange(1, 9)]
+    np.testing.assert_array_equal(arc.jumps.t, 0.5 * np.arange(1, 9))
+    np.testing.assert_allclose(arc.x[-1], [4.5, sum(amounts)], rtol=1e-12)
+    np.testing.assert_allclose(arc.fundamental, [[1.0, 0.0], [8.0, 1.0]], rtol=1e-12)
+
+
 def test_the_properties_hold():
     system = pwm()
     case = Case(system, system.parameters, "on", (0.2,), 0.05, 0.9)

@@ -1,0 +1,154 @@
+"""The tables of a system: their numbers lie behind its parameters, and their knots in time end steps.
+
+So the code of a model is the same whatever its tables hold.
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from hybrid.compiler.traced import Traces, expressions_of
+from hybrid.errors import ModelError
+from hybrid.expression.evaluation import Program
+from hybrid.expression.graph import nodes_of
+from hybrid.expression.nodes import Expression
+from hybrid.expression.pieces import Pieces
+from hybrid.expression.tabulated import Tabulated, has_knots_in_time, repeat_of
+from hybrid.expression.tracing import model_symbols
+from hybrid.system.functions import condition_function, field_function, guard_function
+from hybrid.system.graph import HybridSystem
+
+# The name of a table in generated text, before it is known where its numbers begin.
+NAME = re.compile(r"\bT[0-9a-f]{16}\b")
+# The rounding of an affine argument and of its inverse, as a share of the terms, with a margin.
+MARGIN = 16.0 * float(np.finfo(float).eps)
+# Halvings that bring an interval of this size down to two neighbouring numbers, unless these are next to 0.
+MOST_HALVINGS = 64
+
+
+class Tables:
+    """The places of the tables of a system behind its parameters, in the order of the first question."""
+
+    def __init__(self, parameters: int) -> None:
+        self.end = parameters
+        self.places: dict[Pieces, int] = {}
+
+    def place(self, pieces: Pieces) -> int:
+        """Where the numbers of a table begin."""
+        if pieces not in self.places:
+            self.places[pieces] = self.end
+            self.end += len(pieces.numbers)
+        return self.places[pieces]
+
+    def located(self, text: str) -> str:
+        """Generated text with the places of tables for their names."""
+        return NAME.sub(lambda found: str(self.place(Pieces.known[found[0]])), text)
+
+    def packed(self) -> str:
+        """The numbers of all tables as text."""
+        numbers = [pieces.numbers for pieces in self.places]
+        return base64.b64encode(np.concatenate(numbers).tobytes()).decode() if numbers else ""
+
+
+def unpacked(text: str) -> np.ndarray:
+    """The numbers of all tables."""
+    return np.frombuffer(base64.b64decode(text))
+
+
+class Knots:
+    """The times at which tables of time in the functions of each mode have their points.
+
+    They come in groups: those that come once, and for each period those that come again and again.
+    """
+
+    def __init__(self, system: HybridSystem) -> None:
+        self.system = system
+        self.symbols = model_symbols(system.dimension, len(system.parameters))
+        traces: Traces = {}
+        self.groups: list[tuple[Expression | None, list[Tabulated]]] = []
+        first = [0]
+        for index in range(len(system.modes)):
+            own: dict[Expression | None, list[Tabulated]] = {}
+            for node in _tables_in_time(system, index, traces):
+                own.setdefault(repeat_of(node), []).append(node)
+            self.groups += own.items()
+            first.append(len(self.groups))
+        self.first_group = np.array(first, dtype=np.int64)
+        self._fixed: dict[str, np.ndarray] | None = None
+        if not any(node.mask & self.symbols.p.mask for _, tables in self.groups for node in tables):
+            self._fixed = self._found(system.parameter_values())
+
+    def at(self, values: np.ndarray) -> dict[str, np.ndarray]:
+        """The fields of a model that hold the knots, at parameter values; infinity stands for none."""
+        return self._found(values) if self._fixed is None else self._fixed
+
+    def _found(self, values: np.ndarray) -> dict[str, np.ndarray]:
+        repeats, groups = [], []
+        for repeat, tables in self.groups:
+            length = 0.0 if repeat is None else self._number(repeat, values)
+            if repeat is None:
+                knots = np.concatenate([self._times(node, values) for node in tables])
+            else:
+                # The period itself is a point: there the table begins again.
+                knots = np.concatenate([*(node.pieces.knots for node in tables), [length]])
+                knots[~((knots > 0.0) & (knots <= length))] = np.inf
+            repeats.append(length if 0.0 < length < np.inf else 0.0)
+            groups.append(np.sort(knots))
+        knots = np.concatenate([np.empty(0), *groups])
+        return {
+            "first_group": self.first_group,
+            "repeat": np.array(repeats, dtype=float),
+            "first_knot": np.cumsum([0, *map(len, groups)], dtype=np.int64),
+            "knots": knots,
+            "before_knots": np.nextafter(knots, -np.inf),
+        }
+
+    def _number(self, expression: Expression, values: np.ndarray) -> float:
+        known = dict(zip(self.symbols.p, values, strict=False))
+        return float(Program([expression]).run(known)[0])
+
+    def _times(self, node: Tabulated, values: np.ndarray) -> np.ndarray:
+        """The first times at which the argument of a table has reached its knots, in floating point."""
+        knots = node.pieces.knots
+        if node.args[0] is self.symbols.t:
+            return knots
+        program, known = Program(node.args), dict(zip(self.symbols.p, values, strict=False))
+
+        def argument(t: np.ndarray) -> np.ndarray:
+            return np.asarray(program.run({**known, self.symbols.t: t})[0], dtype=float)
+
+        start, end = argument(np.array([0.0, 1.0]))
+        slope = end - start
+        if not (np.isfinite(slope) and slope != 0.0):
+            return np.full(len(knots), np.inf)
+        times = (knots - start) / slope
+        around = MARGIN * (np.abs(knots) + np.abs(start) + np.abs(end)) / abs(slope)
+        low, high = times - around, times + around
+        for _ in range(MOST_HALVINGS):
+            middle = 0.5 * (low + high)
+            # A falling argument leaves a piece right behind its knot, where that piece still holds.
+            reached = argument(middle) >= knots if slope > 0.0 else argument(middle) < knots
+            low, high = np.where(reached, low, middle), np.where(reached, middle, high)
+        return high
+
+
+def _tables_in_time(system: HybridSystem, index: int, traces: Traces) -> Iterator[Tabulated]:
+    """The tables of time in the field of a mode, and in the guards and conditions that leave it."""
+    mode = system.modes[index]
+    leaving = [each for each in system.transitions if each.source == mode.name]
+    functions = [field_function(mode, system.variables), *map(guard_function, leaving)]
+    functions += [each for each in map(condition_function, leaving) if each is not None]
+    found: dict[tuple[Expression, bytes], Tabulated] = {}
+    for function in functions:
+        try:
+            expressions = expressions_of(system, function, traces)
+        except ModelError:
+            continue
+        for node in nodes_of(Tabulated, *expressions):
+            if has_knots_in_time(node):
+                found.setdefault((node.args[0], node.pieces.knots.tobytes()), node)
+    yield from found.values()

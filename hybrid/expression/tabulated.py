@@ -1,0 +1,101 @@
+"""Tables as an operation on expressions: one node, with the piecewise polynomial attached."""
+
+# ruff: noqa: D102 - methods that override others are explained there
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from hybrid.errors import ModelError
+from hybrid.expression.graph import Group, degree_of, mentions, nodes_of, symbols_of
+from hybrid.expression.nodes import ZERO, Expression, Symbol, _kept, number
+from hybrid.expression.operations import RealFunction, Remainder
+from hybrid.expression.pieces import Pieces
+from hybrid.expression.ranges import Range, closed
+from hybrid.expression.values import looked_up
+
+
+class Tabulated(RealFunction):
+    """The value of a table at ``u``, or a derivative of some order of its pieces."""
+
+    __slots__ = ("derived", "pieces")
+
+    word = "table"
+    pieces: Pieces
+    derived: int
+
+    def __new__(cls, u: Expression, pieces: Pieces, derived: int = 0) -> Any:
+        if derived > pieces.degree:
+            return ZERO
+        if u.is_number:
+            return number(float(pieces.at(float(u), derived)))
+        return _kept(cls, u, pieces, derived)
+
+    def _begin(self, *args: Any) -> None:
+        u, self.pieces, self.derived = args
+        super()._begin(u)
+        # Terms stand in the same order in every process.
+        first, size, numbers, word = self.order
+        self.order = first, size, numbers, word ^ int(self.pieces.name[1:], 16) ^ self.derived
+
+    @property
+    def attached(self) -> Any:
+        return self.pieces, self.derived
+
+    def numpy(self, u: Any) -> Any:
+        """The values at numbers."""
+        return looked_up(self.pieces, u, self.derived)
+
+    def range(self, u: Range) -> Range:
+        """All values, wherever it is read."""
+        return closed(*self.pieces.ends(self.derived))
+
+    def slope(self, place: int = 0) -> Expression:
+        found: Expression = Tabulated(self.args[0], self.pieces, self.derived + 1)
+        return found
+
+    @property
+    def jumps(self) -> bool:
+        """Whether it jumps at a knot."""
+        return self.pieces.jumps(self.derived)
+
+    @property
+    def number_of_piece(self) -> Expression:
+        """A table that jumps at every knot."""
+        found: Expression = Tabulated(self.args[0], self.pieces.places())
+        return found
+
+
+def has_knots_in_time(node: Expression) -> bool:
+    """Whether a node is a table of ``a t + b``, or of ``t % T``: its knots end steps.
+
+    ``a``, ``b`` and ``T`` are made of numbers and parameters.
+    """
+    if not isinstance(node, Tabulated):
+        return False
+    argument = node.args[0]
+    names = {each.label for each in symbols_of(argument)}
+    if "t" not in names or any(name.startswith("x[") for name in names):
+        return False
+    time = Symbol("t")
+    return repeat_of(node) is not None or degree_of(argument, frozenset((time,))) == 1
+
+
+def repeat_of(node: Tabulated) -> Expression | None:
+    """``T`` of a table of ``t % T``; None for other tables."""
+    argument, time = node.args[0], Symbol("t")
+    if isinstance(argument, Remainder) and argument.args[0] is time and not argument.args[1].mask & time.mask:
+        return argument.args[1]
+    return None
+
+
+def check_tables(what: str, expressions: Iterable[Expression], states: Iterable[Symbol]) -> None:
+    """ModelError if a table jumps in the state: its jumps are not taken apart."""
+    symbols = Group(states)
+    for table in nodes_of(Tabulated, *expressions):
+        if table.jumps and mentions(table, symbols):
+            raise ModelError(
+                f"{what} has a table of {len(table.pieces.knots)} points that jumps in the state, which is "
+                "not made into modes. Use kind='linear', or np.where for a few jumps."
+            )

@@ -1,0 +1,48 @@
+"""The functions of NumPy that model functions may call, by what is known of them."""
+
+# NumPy's universal functions that can be traced; ``hybrid.expression.ufuncs`` has a rule for each.
+UFUNCS = frozenset(
+    {
+        "add", "subtract", "multiply", "divide", "floor_divide", "remainder", "fmod", "power", "float_power",
+        "negative", "positive", "absolute", "fabs", "sign", "square", "reciprocal", "sqrt", "cbrt", "exp",
+        "exp2", "expm1", "log", "log2", "log10", "log1p", "sin", "cos", "tan", "arcsin", "arccos", "arctan",
+        "arctan2", "sinh", "cosh", "tanh", "arcsinh", "arccosh", "arctanh", "hypot", "deg2rad", "radians",
+        "rad2deg", "degrees", "floor", "ceil", "trunc", "maximum", "minimum", "fmax", "fmin", "clip",
+        "heaviside", "less", "less_equal", "greater", "greater_equal", "equal", "not_equal", "logical_and",
+        "logical_or", "logical_xor", "logical_not", "conjugate",
+    }
+)  # fmt: skip
+# Those that give booleans, whatever their arguments.
+TRUTHS = frozenset(
+    {
+        "less", "less_equal", "greater", "greater_equal", "equal", "not_equal", "logical_and", "logical_or",
+        "logical_xor", "logical_not",
+    }
+)  # fmt: skip
+# Name of np.where in an algebra.
+WHERE = "where"
+# What NumPy's functions do with booleans alone: True + True is True.
+OF_TRUTHS = {
+    "add": "logical_or", "multiply": "logical_and", "maximum": "logical_or", "minimum": "logical_and",
+    "fmax": "logical_or", "fmin": "logical_and", "bitwise_and": "logical_and", "bitwise_or": "logical_or",
+    "bitwise_xor": "logical_xor", "invert": "logical_not",
+}  # fmt: skip
+BITWISE = frozenset({"bitwise_and", "bitwise_or", "bitwise_xor", "invert"})
+# These count booleans.
+REDUCTIONS = ("reduce", "accumulate", "reduceat")
+# What to write in place of functions that cannot be traced.
+INSTEAD = {
+    "rint": "np.floor(x + 0.5)",
+    "round": "np.floor(x + 0.5)",
+    "logaddexp": "np.log(np.exp(a) + np.exp(b))",
+    "logaddexp2": "np.log2(np.exp2(a) + np.exp2(b))",
+    "copysign": "np.abs(a)*np.sign(b)",
+    "signbit": "x < 0",
+    "modf": "np.trunc(x) and x - np.trunc(x)",
+    "ldexp": "a*2.0**b",
+    "sinc": "np.sin(np.pi*x)/(np.pi*x)",
+    "angle": "np.arctan2(y, x)",
+    "sort": "np.minimum(a, b) and np.maximum(a, b)",
+}
+# These form sums of products, which NumPy does on object arrays with the operators of the scalars.
+CONTRACTIONS = ("matmul", "vecdot", "matvec", "vecmat")

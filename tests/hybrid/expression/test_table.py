@@ -1,0 +1,227 @@
+"""Tables in model functions, against closed forms."""
+
+import pickle
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from scipy.interpolate import CubicSpline, PchipInterpolator
+
+from hybrid import (
+    DOP853,
+    ArgumentError,
+    Guard,
+    HybridSystem,
+    Mode,
+    ModelError,
+    RadauIIA,
+    Table,
+    Transition,
+    Tsit5,
+    compile_system,
+    simulate,
+    simulate_many,
+    split,
+)
+
+RNG = np.random.default_rng(0)
+TIMES = np.sort(RNG.uniform(0.0, 10.0, 40))
+VALUES = RNG.standard_normal(40)
+SOLVERS = [None, DOP853(), Tsit5(), RadauIIA()]
+
+
+def tank(rate, **parameters):
+    return HybridSystem(state=("q",), parameters=parameters, modes=[Mode("fill", rate)])
+
+
+def filled(rate, end=10.0, solver=None, **parameters):
+    return simulate(tank(rate, **parameters), (0.0,), (0.0, end), solver=solver)["q"][-1]
+
+
+def integral(table, end):
+    """The integral of a table of steps or lines from 0 on: the rule of the middle is exact on each piece."""
+    times = np.concatenate([[0.0], table.x[(table.x > 0.0) & (table.x < end)], [end]])
+    return np.sum(np.diff(times) * table(0.5 * (times[1:] + times[:-1])))
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("kind", ["linear", "step"])
+def test_the_integral_of_a_table_in_time(kind, solver):
+    table = Table(TIMES, VALUES, kind=kind)
+    found = filled(lambda t, x, p: (table(t),), solver=solver)
+    assert found == pytest.approx(integral(table, 10.0), abs=1e-13)
+
+
+def test_the_integral_of_a_spline():
+    spline = CubicSpline(TIMES, VALUES)
+    table = Table(TIMES, VALUES, kind="cubic")
+    assert filled(lambda t, x, p: (table(t),)) == pytest.approx(float(spline.integrate(0.0, 10.0)), abs=1e-9)
+
+
+@pytest.mark.parametrize(("a", "b"), [(3.0, 0.1), (-0.7, 6.5), (1 / 3, 0.0), (0.0, 4.5)])
+def test_the_knots_of_an_affine_time_follow_the_parameters(a, b):
+    table = Table(TIMES, VALUES, kind="step")
+    times = [0.0, 10.0, *((k - b) / a for k in TIMES if a and 0.0 < (k - b) / a < 10.0)]
+    times = np.sort(times)
+    wanted = np.sum(np.diff(times) * table(a * 0.5 * (times[1:] + times[:-1]) + b))
+    system = tank(lambda t, x, p: (table(p.a * t + p.b),), a=1.0, b=0.0)
+    given = {"a": a, "b": b}
+    found = simulate(system, (0.0,), (0.0, 10.0), parameters=given)["q"][-1]
+    assert found == pytest.approx(wanted, abs=1e-12)
+    many = simulate_many(system, [(0.0,), (1.0,)], (0.0, 10.0), parameters=given)
+    np.testing.assert_allclose(many.x_end.values.ravel(), [wanted, 1.0 + wanted], atol=1e-12)
+
+
+def test_tangent_vectors_pass_the_knots():
+    table = Table(TIMES, VALUES)
+    system = tank(lambda t, x, p: (table(t) - p.k * x.q,), k=0.3)
+    arc = simulate(system, (0.0,), (0.0, 10.0), tangent=True, sensitivities=("k",))
+    assert arc.fundamental[0, 0] == pytest.approx(np.exp(-3.0), rel=1e-9)
+    beside = [simulate(system, (0.0,), (0.0, 10.0), parameters={"k": k})["q"][-1] for k in (0.3001, 0.2999)]
+    assert np.ravel(arc.sensitivity)[0] == pytest.approx((beside[0] - beside[1]) / 2e-4, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["linear", "step"])
+def test_no_pulse_among_many_points_is_passed_over(kind):
+    times, values = np.linspace(0.0, 1e4, 10_000), np.zeros(10_000)
+    values[5000] = 7.0
+    table = Table(times, values, kind=kind)
+    found = filled(lambda t, x, p: (table(t),), end=1e4)
+    assert found == pytest.approx(7.0 * (times[1] - times[0]), rel=1e-11)
+
+
+def test_what_many_points_hold_is_not_compiled():
+    one, other = (Table(x, x**2) for x in (np.linspace(0.0, 1.0, 1000), np.linspace(0.0, 2.0, 1000)))
+    texts = [
+        compile_system(tank(lambda t, x, p: (one(t),))).emitted.texts,
+        compile_system(tank(lambda t, x, p: (other(t),))).emitted.texts,
+    ]
+    assert texts[0] == texts[1]
+
+
+def test_interp_is_a_table():
+    table = Table(TIMES, VALUES)
+    found = filled(lambda t, x, p: (np.interp(t, TIMES, VALUES),))
+    assert found == pytest.approx(integral(table, 10.0), abs=1e-13)
+    # Beyond the points, other values.
+    found = filled(lambda t, x, p: (np.interp(t, [1.0, 2.0], [0.0, 1.0], left=3.0, right=5.0),), end=4.0)
+    assert found == pytest.approx(3.0 + 0.5 + 10.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("solver", SOLVERS[:2])
+def test_a_force_as_a_table_keeps_the_energy(solver):
+    places = np.linspace(-2.0, 2.0, 41)
+    force = Table(places, -places - 0.3 * places**3)
+    system = HybridSystem(state=("q", "v"), modes=[Mode("swing", lambda t, x, p: (x.v, force(x.q)))])
+    arc = simulate(system, (1.5, 0.0), (0.0, 20.0), solver=solver)
+
+    def energy(q, v):
+        knots = np.concatenate([[0.0], places[(places > 0.0) & (places < abs(q))], [abs(q)]])
+        return 0.5 * v**2 - np.trapezoid(force(knots), knots)
+
+    assert energy(*arc.x[-1]) == pytest.approx(energy(1.5, 0.0), rel=1e-7)
+
+
+def test_guards_read_tables():
+    charge = np.linspace(0.0, 1.0, 11)
+    voltage = Table(charge, 3.0 + charge**2)
+    empty = Guard(lambda t, x, p: voltage(x.s) - 3.25)
+    cell = HybridSystem(
+        state=("s",),
+        modes=[Mode("run", lambda t, x, p: (-0.1,))],
+        transitions=[Transition("run", None, empty)],
+    )
+    assert simulate(cell, (1.0,), (0.0, 20.0)).jumps.t == pytest.approx([5.0], rel=1e-12)
+    limit = Table([0.0, 1.0, 2.0, 3.0], [5.0, 5.0, -1.0, 5.0], kind="step")
+    above = Guard(lambda t, x, p: x.s - limit(t), direction=1)
+    ramp = HybridSystem(
+        state=("s",),
+        modes=[Mode("run", lambda t, x, p: (1.0,))],
+        transitions=[Transition("run", None, above)],
+    )
+    assert simulate(ramp, (0.0,), (0.0, 4.0)).jumps.t == pytest.approx([2.0], rel=1e-12)
+
+
+def test_a_jump_in_the_state_is_told_and_not_split():
+    stairs = Table([0.0, 1.0], [1.0, 2.0], kind="step")
+    system = tank(lambda t, x, p: (stairs(x.q),))
+    assert "its field jumps where q is at a point of a table" in str(compile_system(system))
+    with pytest.raises(ModelError, match="has a table of 2 points that jumps in the state"):
+        split(system)
+    smooth = tank(lambda t, x, p: (stairs(t),))
+    assert "jumps" not in str(compile_system(smooth))
+    assert simulate(split(smooth), (0.0,), (0.0, 2.0))["q"][-1] == pytest.approx(3.0, abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        pd.Series(VALUES, index=TIMES),
+        xr.DataArray(VALUES, dims="t", coords={"t": TIMES}),
+        PchipInterpolator(TIMES, VALUES),
+        CubicSpline(TIMES, VALUES),
+    ],
+    ids=["pandas", "xarray", "pchip", "spline"],
+)
+def test_points_from_other_libraries(data):
+    table, u = Table(data), np.linspace(-1.0, 11.0, 50)
+    wanted = data(u) if callable(data) else np.interp(u, TIMES, VALUES)
+    np.testing.assert_allclose(table(u), wanted, rtol=1e-9, atol=1e-9)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(table))(u), table(u))
+    assert repr(table).startswith("Table of 40 points")
+
+
+def test_values_at_numbers_and_arrays():
+    table = Table([0.0, 1.0], [2.0, 4.0])
+    assert table(0.5) == 3.0
+    np.testing.assert_array_equal(table([[-1.0, 0.0], [1.0, np.inf]]), [[2.0, 2.0], [4.0, 4.0]])
+    assert np.isnan(table(np.nan))
+    np.testing.assert_array_equal(Table([0.0, 1.0], [2.0, 4.0], kind="step")([-1.0, 0.9, 1.0]), [2, 2, 4])
+
+
+def test_a_spline_of_scipy_is_told_what_to_write():
+    spline = CubicSpline(TIMES, VALUES)
+    with pytest.raises(ModelError, match=r"call hybrid\.Table\(spline\)"):
+        compile_system(tank(lambda t, x, p: (spline(t),)))
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "text"),
+    [
+        ([0.0, 1.0, 1.0], [0.0, 1.0, 2.0], r"x must increase; got x\[1\] = 1.0 and x\[2\] = 1.0"),
+        ([0.0, 1.0], [0.0, np.nan], r"y must be finite; got y\[1\] = nan"),
+        ([0.0, 1.0], [0.0, 1.0, 2.0], "y must have one value per point; got 3 for 2 in x"),
+        ([0.0], [0.0], "x must be at least two numbers"),
+        ([0.0, 1.0], None, "y must be numbers"),
+    ],
+)
+def test_bad_points(x, y, text):
+    with pytest.raises(ArgumentError, match=text):
+        Table(x, y)
+
+
+@pytest.mark.parametrize("declared", [None, 5.0])
+@pytest.mark.parametrize("kind", ["linear", "step"])
+def test_a_cycle_that_repeats(kind, declared):
+    cycle = Table([0.0, 1.0, 1.001, 5.0], [0.0, 1000.0, 3.0, 0.0], kind=kind)
+    system = HybridSystem(
+        state=("q",),
+        parameters={"T": 5.0},
+        modes=[Mode("fill", lambda t, x, p: (cycle(t % p.T),))],
+        period=declared,
+    )
+    arc = simulate(system, (0.0,), (0.0, 52.0))
+    assert arc.status.code.name == "SUCCESS"
+    assert arc["q"][-1] == pytest.approx(10.0 * integral(cycle, 5.0) + integral(cycle, 2.0), rel=1e-13)
+    assert arc.steps < 200
+    if declared is None:
+        arc = simulate(system, (0.0,), (0.0, 6.0), parameters={"T": 3.0})
+        assert arc["q"][-1] == pytest.approx(2.0 * integral(cycle, 3.0), rel=1e-13)
+
+
+def test_cycles_of_different_lengths():
+    one, other = (Table(TIMES, VALUES + shift, kind="step") for shift in (0.0, 1.0))
+    found = filled(lambda t, x, p: (one(t % 3.0) + other(t % 4.0) + one(t),), end=12.0)
+    wanted = 4.0 * integral(one, 3.0) + 3.0 * integral(other, 4.0) + integral(one, 12.0)
+    assert found == pytest.approx(wanted, rel=1e-13)
