@@ -14,10 +14,10 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.compiler.agreement import check_agreement
+from hybrid.compiler.arrays import clock_arrays, indices, leaving
 from hybrid.compiler.cache import store
 from hybrid.compiler.cache.folder import announced
 from hybrid.compiler.cache.loader import Absent, load_kernels
-from hybrid.compiler.clocks import clock_arrays
 from hybrid.compiler.parts import EVENTS, FIELDS, SERIES, TANGENT_SERIES, VARIATIONAL
 from hybrid.compiler.surfaces import is_paired
 from hybrid.compiler.tables import Knots, unpacked
@@ -25,7 +25,6 @@ from hybrid.compiler.traced import key_of
 from hybrid.errors import ArgumentError, ModelError
 from hybrid.kernels.types.codes import DESINGULARISED, NARROW, NO_MODE, ROOTED, RUNGE_KUTTA
 from hybrid.kernels.types.layout import Model, Programs
-from hybrid.system.clocks import At, Every
 from hybrid.system.functions import CLOCK, CONDITION, ModelFunction
 from hybrid.system.graph import HybridSystem, as_system, functions_of, watched_by
 from hybrid.system.periodicity import period_at, period_fault
@@ -258,9 +257,9 @@ class CompiledSystem:
         programs = self.emitted.programs
         return Programs(
             rows=np.array(programs.rows, dtype=np.int64).reshape(-1, 4),
-            checked=_indices(programs.checked),
+            checked=indices(programs.checked),
             numbers=np.array(programs.numbers, dtype=float),
-            first=_indices(programs.first),
+            first=indices(programs.first),
             parameters=self.with_tables(self.system.parameter_values()),
         )
 
@@ -284,8 +283,8 @@ class CompiledSystem:
     def _model(self) -> Any:
         system = self.system
         transitions = system.transitions
-        first_outgoing, outgoing = _leaving(system, at_start=False)
-        first_at_start, at_start = _leaving(system, at_start=True)
+        first_outgoing, outgoing = leaving(system, lambda each: not (each.clock or each.guard.at_start))
+        first_at_start, at_start = leaving(system, lambda each: each.guard.at_start)
         return Model(
             **self.functions(FIELDS),
             **self.functions(EVENTS),
@@ -300,32 +299,32 @@ class CompiledSystem:
             first_at_start=first_at_start,
             at_start=at_start,
             **clock_arrays(system, self.emitted),
-            target=_indices(_index_or_none(system, transition.target) for transition in transitions),
-            direction=_indices(transition.guard.direction for transition in transitions),
+            target=indices(_index_or_none(system, transition.target) for transition in transitions),
+            direction=indices(transition.guard.direction for transition in transitions),
             programs=self._programs,
             **_program_runners(bool(self.emitted.programs.rows)),
             **_slopes(self.emitted.slope_columns),
-            paired=_indices(is_paired(system, self.emitted, i) for i in range(len(transitions))),
-            marker=_indices(transition.is_marker for transition in transitions),
-            accumulates_to=_indices(
+            paired=indices(is_paired(system, self.emitted, i) for i in range(len(transitions))),
+            marker=indices(transition.is_marker for transition in transitions),
+            accumulates_to=indices(
                 _index_or_none(system, transition.accumulates_to) for transition in transitions
             ),
-            propagator=_indices(propagator.kind for propagator in self.emitted.propagators),
-            degree=_indices(propagator.degree for propagator in self.emitted.propagators),
-            bounded=_indices([self.emitted.pulses_excluded(mode) for mode in range(len(system.modes))]),
-            fragile=_indices(self.emitted.is_fragile(mode) for mode in range(len(system.modes))),
-            steep=_indices(bool(powers) for powers in self.emitted.steep),
-            root=_indices(propagator.root for propagator in self.emitted.propagators),
-            field_before=_indices(before for before, _ in self.emitted.crossing),
-            field_behind=_indices(behind for _, behind in self.emitted.crossing),
-            timed=_indices(self._is_timed(i) for i in range(len(system.modes))),
-            conditional=_indices(
+            propagator=indices(propagator.kind for propagator in self.emitted.propagators),
+            degree=indices(propagator.degree for propagator in self.emitted.propagators),
+            bounded=indices([self.emitted.pulses_excluded(mode) for mode in range(len(system.modes))]),
+            fragile=indices(self.emitted.is_fragile(mode) for mode in range(len(system.modes))),
+            steep=indices(bool(powers) for powers in self.emitted.steep),
+            root=indices(propagator.root for propagator in self.emitted.propagators),
+            field_before=indices(before for before, _ in self.emitted.crossing),
+            field_behind=indices(behind for _, behind in self.emitted.crossing),
+            timed=indices(self._is_timed(i) for i in range(len(system.modes))),
+            conditional=indices(
                 any(each.source == name and each.guard.when is not None for each in transitions)
                 for name in system.mode_names
             ),
-            timed_jump=_indices(map(max, self.emitted.timed_guard, self.emitted.timed_reset)),
+            timed_jump=indices(map(max, self.emitted.timed_guard, self.emitted.timed_reset)),
             tangent_start=self.emitted.tangent_start,
-            tangent_columns=_indices(each.series.tangent_columns for each in self.emitted.propagators),
+            tangent_columns=indices(each.series.tangent_columns for each in self.emitted.propagators),
             period=0.0,
         )
 
@@ -336,10 +335,9 @@ class CompiledSystem:
 
     @property
     def is_timed(self) -> bool:
-        """Whether a field, a guard, a clock or a reset may depend on time."""
+        """Whether a field, a guard or a reset may depend on time, a clock not being one."""
         emitted = self.emitted
-        ticks = any(isinstance(each.guard, Every | At) for each in self.system.transitions)
-        return ticks or not all(emitted.autonomous) or any(emitted.timed_guard) or any(emitted.timed_reset)
+        return not all(emitted.autonomous) or any(emitted.timed_guard) or any(emitted.timed_reset)
 
     def _is_timed(self, mode: int) -> bool:
         """Whether the field of a mode, or one of the guards in it, may depend on time."""
@@ -348,26 +346,12 @@ class CompiledSystem:
         return not emitted.autonomous[mode] or any(timed for each, timed in pairs if each.source == name)
 
 
-def _leaving(system: HybridSystem, *, at_start: bool) -> tuple[np.ndarray, np.ndarray]:
-    """The transitions that leave each mode, of guards of one kind: first places, and indices."""
-    indices: list[int] = []
-    first = [0]
-    for name in system.mode_names:
-        indices += [
-            i
-            for i, transition in enumerate(system.transitions)
-            if transition.source == name and transition.guard.at_start == at_start and not transition.clock
-        ]
-        first.append(len(indices))
-    return _indices(first), _indices(indices)
-
-
 def _slopes(columns: Sequence[Sequence[Sequence[int]]]) -> dict[str, np.ndarray]:
     """The entries of the Jacobians of all modes: where each row begins and ends, and their columns."""
     rows = [row for of_mode in columns for row in of_mode]
     n, ends = len(columns[0]), np.cumsum([0, *map(len, rows)])
     first = np.array([ends[n * mode : n * mode + n + 1] for mode in range(len(columns))])
-    return {"first_slope": first, "slope_column": _indices(column for row in rows for column in row)}
+    return {"first_slope": first, "slope_column": indices(column for row in rows for column in row)}
 
 
 def _program_runners(needed: bool) -> dict[str, Any]:
@@ -386,10 +370,6 @@ def _no_knots(modes: int) -> dict[str, np.ndarray]:
     """The knots of a model without tables in time."""
     firsts = {"first_group": np.zeros(modes + 1, dtype=np.int64), "first_knot": np.zeros(1, dtype=np.int64)}
     return {**firsts, **{name: np.empty(0) for name in ("repeat", "knots", "before_knots")}}
-
-
-def _indices(values: Any) -> np.ndarray:
-    return np.array([int(value) for value in values], dtype=np.int64)
 
 
 def compile_system(system: HybridSystem) -> CompiledSystem:

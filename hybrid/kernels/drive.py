@@ -8,7 +8,6 @@ from hybrid.kernels.arithmetic.clock import forward, set_clock, time_before, tim
 from hybrid.kernels.arithmetic.tables import knots_passed
 from hybrid.kernels.events.clocks import (
     go_to_tick,
-    has_clocks,
     next_tick,
     pass_tick,
     ticking,
@@ -91,9 +90,7 @@ def fire(parts, task, stop_cycle, stop_phase, max_jumps):
         return GO_ON
     if parts.complete == 0:
         return INCOMPLETE
-    remaining = time_left(model, run, stop_cycle, stop_phase)
-    if has_clocks(model, run.mode):
-        remaining = min(remaining, next_tick(model, run)[1])
+    remaining = min(time_left(model, run, stop_cycle, stop_phase), next_tick(model, run)[1])
     ended = parts.finish_chatter(task, fired, remaining)
     if ended and model.accumulates_to[run.last_fired] == NO_MODE:
         return ACCUMULATION
@@ -279,7 +276,7 @@ def pass_knot(task, knot):
     No step looks at the knot itself, so the moment before belongs to the piece that ends there.
     """
     model, run, out = task.model, task.run, task.work.error
-    gap = time_until(run, knot)
+    gap = time_until(run, knot, 0.0)
     rates_by_jacobian(model, run.mode, run.phase, run.y, task.tangents, task.work.jacobian, out)
     for i in range(model.dimension * (1 + task.tangents)):
         run.y[i] += gap * out[i]

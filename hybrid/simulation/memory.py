@@ -213,7 +213,7 @@ def record_layout(dimension: int, degree: int, steps: int, jumps: int) -> Any:
 
 
 @lru_cache(MOST_LAYOUTS)
-def run_layout(dimension: int, tangents: int, modes: int, transitions: int, ticks: int = 0) -> Any:
+def run_layout(dimension: int, tangents: int, modes: int, transitions: int, ticks: int) -> Any:
     """Where the arrays of a run lie, and what they hold in one that has no mode yet and has not jumped."""
     n = dimension
     shapes = {

@@ -11,7 +11,6 @@ import numpy as np
 from hybrid import arguments
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.compiled import CompiledSystem, compile_system
-from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
 from hybrid.kernels.types.codes import UNLIMITED
 from hybrid.simulation.initial_mode import choose_mode
@@ -88,8 +87,6 @@ class Common:
     ) -> Trajectory:
         """A trajectory at its start; ``model_of(plan, memory)`` is the model at the parameters of the run."""
         compiled, tangents = self.compiled, 0 if self.tangent is None else self.tangent.shape[1]
-        if tangents:
-            _check_entries(compiled.system)
         plan = plan_of(compiled, self.solver, tangents)
         memory = plan.memory()
         model = model_of(plan, memory)
@@ -108,17 +105,6 @@ class Common:
         memory.run.mode = index
         most = self.solver.max_steps
         return Trajectory(compiled, plan, model, memory, tangents, most, phase0, beyond, self.stop)
-
-
-def _check_entries(system: HybridSystem) -> None:
-    """ArgumentError if tangent vectors would need to know when a mode was entered."""
-    named = [each.name for each in system.transitions if each.clock and each.clock.number == codes.AFTER]
-    if named:
-        raise ArgumentError(
-            f"Transition {named[0]!r}: tangent vectors do not know when its mode was entered, which After "
-            "counts from. For derivatives, exponents and multipliers give the state a component of rate 1 in "
-            "that mode that is reset to 0 where the mode is entered, and in place of After a Guard on it."
-        )
 
 
 @attrs.frozen(eq=False)

@@ -15,7 +15,6 @@ from hybrid.system.portable import Portable
 
 # A number, the name of a parameter, or a function of ``p``.
 Quantity = Any
-Read = Callable[[Any], Any]
 
 
 def _as_quantity(kind: str, name: str, value: Any) -> Quantity:
@@ -55,6 +54,18 @@ def _short(quantity: Quantity) -> str:
     return quantity if isinstance(quantity, str) else "f(p)"
 
 
+@attrs.frozen
+class Since:
+    """The guard of a clock as a function: the time since the nearest tick."""
+
+    clock: Any
+
+    def __call__(self, t: Any, x: Any, p: Any) -> Any:
+        """The time since the nearest tick, negative before it."""
+        return self.clock._since_tick(t, self.clock._numbers(x, p))
+
+
+@attrs.frozen
 class Clock(Portable):
     """What clocks have in common: each is a guard whose zeros in time are known, so none is searched for.
 
@@ -62,18 +73,23 @@ class Clock(Portable):
     numbers depend on.
     """
 
-    __slots__ = ()
-
     # Clocks as the kernels number them.
     number: ClassVar[int] = 0
     direction: ClassVar[int] = 1
     gradient: ClassVar[None] = None
     at_start: ClassVar[bool] = False
 
-    @property
-    def function(self) -> Callable[..., Any]:
-        """The clock as a guard."""
-        raise NotImplementedError
+    # The clock as a guard.
+    function: Callable[..., Any] = attrs.field(
+        init=False, eq=False, repr=False, default=attrs.Factory(Since, takes_self=True)
+    )
+
+    def __attrs_post_init__(self) -> None:
+        # Numbers that depend on parameters are checked by the run.
+        if all(isinstance(quantity, float) for quantity in self.quantities):
+            fault = self._fault(self.quantities)
+            if fault:
+                raise ModelError(f"{type(self).__name__}: {fault}.")
 
     @property
     def when(self) -> Callable[..., Any] | None:
@@ -122,25 +138,6 @@ def _check_when(instance: Any, attribute: attrs.Attribute[Any], value: object) -
         )
 
 
-def _check_numbers(instance: Any) -> None:
-    """ModelError if numbers that do not hang on parameters are wrong."""
-    if all(isinstance(quantity, float) for quantity in instance.quantities):
-        fault = instance._fault(instance.quantities)
-        if fault:
-            raise ModelError(f"{type(instance).__name__}: {fault}.")
-
-
-@attrs.frozen
-class Since:
-    """The guard of a clock as a function: the time since the nearest tick."""
-
-    clock: Clock
-
-    def __call__(self, t: Any, x: Any, p: Any) -> Any:
-        """The time since the nearest tick, negative before it."""
-        return self.clock._since_tick(t, self.clock._numbers(x, p))
-
-
 @attrs.frozen
 class Every(Clock):
     """A clock that ticks at ``offset + k period`` for every whole number ``k``, in the place of a guard.
@@ -173,13 +170,7 @@ class Every(Clock):
     period: Quantity = attrs.field(converter=_as_period)
     offset: Quantity = attrs.field(default=0.0, converter=_as_offset)
     when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=_check_when)
-    function: Callable[..., Any] = attrs.field(
-        init=False, eq=False, repr=False, default=attrs.Factory(Since, takes_self=True)
-    )
     number: ClassVar[int] = 1
-
-    def __attrs_post_init__(self) -> None:
-        _check_numbers(self)
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -243,13 +234,7 @@ class At(Clock):
 
     times: tuple[Quantity, ...] = attrs.field(converter=_as_times)
     when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=_check_when)
-    function: Callable[..., Any] = attrs.field(
-        init=False, eq=False, repr=False, default=attrs.Factory(Since, takes_self=True)
-    )
     number: ClassVar[int] = 2
-
-    def __attrs_post_init__(self) -> None:
-        _check_numbers(self)
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -309,13 +294,7 @@ class After(Clock):
 
     duration: Quantity = attrs.field(converter=_as_duration)
     when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=_check_when)
-    function: Callable[..., Any] = attrs.field(
-        init=False, eq=False, repr=False, default=attrs.Factory(Since, takes_self=True)
-    )
     number: ClassVar[int] = 3
-
-    def __attrs_post_init__(self) -> None:
-        _check_numbers(self)
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -349,9 +328,6 @@ class DerivedClock(Clock):
     clock: Clock
     read: Callable[[Any, Any], Sequence[Any]]
     when: Callable[..., Any] | None
-    function: Callable[..., Any] = attrs.field(
-        init=False, eq=False, repr=False, default=attrs.Factory(Since, takes_self=True)
-    )
 
     @property
     def number(self) -> int:  # type: ignore[override]

@@ -9,11 +9,9 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.layout import EPSILON, UPPER_HALF
 from hybrid.kernels.types.options import INLINE, KERNEL
 
-# Factor that splits a number into an upper and a lower half of its digits.
-UPPER_HALF = 2.0**27 + 1.0
 # The rounding error of a sum is found only if the compiler keeps the order of the operations.
 IN_ORDER = KERNEL | {"fastmath": False}
 
@@ -48,9 +46,9 @@ def time_left(model, run, stop_cycle, stop_phase):
 
 
 @njit(**IN_ORDER)
-def time_until(run, phase):
-    """Time until a phase of the current period."""
-    return (phase - run.phase) - run.phase_low
+def time_until(run, phase, low):
+    """Time until a phase of the current period, in two parts."""
+    return (phase - run.phase) + (low - run.phase_low)
 
 
 @njit(**IN_ORDER)

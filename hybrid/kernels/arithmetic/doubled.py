@@ -8,9 +8,7 @@ import numpy as np
 
 from hybrid.kernels.instructions.registers import built_in, everywhere, vector_of
 from hybrid.kernels.types.codes import NARROW
-
-# Factor ``U`` that splits a number ``x``: ``U x - (U x - x)`` has the upper half of the digits of ``x``.
-UPPER_HALF = 2.0**27 + 1.0
+from hybrid.kernels.types.layout import UPPER_HALF
 
 
 def divided_dot_product(factors, highs, lows, by):

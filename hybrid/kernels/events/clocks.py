@@ -9,17 +9,18 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.clock import IN_ORDER, product_in_two_parts, sum_in_two_parts
+from hybrid.kernels.arithmetic.clock import (
+    IN_ORDER,
+    forward,
+    product_in_two_parts,
+    sum_in_two_parts,
+    time_until,
+)
+from hybrid.kernels.arithmetic.tables import knots_passed
 from hybrid.kernels.events.guards import allowed
 from hybrid.kernels.types.codes import AFTER, AT, EVERY, NO_TRANSITION
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
-
-
-@njit(**INLINE)
-def has_clocks(model, mode):
-    """Whether a mode is left at known times."""
-    return model.first_clock[mode + 1] > model.first_clock[mode]
 
 
 @njit(**IN_ORDER)
@@ -44,11 +45,11 @@ def place_of_tick(model, run, transition, k):
     return sum_in_two_parts(total, lost + more_lost + low + rest)
 
 
-@njit(**IN_ORDER)
-def until(run, place):
-    """Time from now to a place in the current period."""
-    high, low = place
-    return (high - run.phase) + (low - run.phase_low)
+@njit(**KERNEL)
+def time_to_tick(model, run, transition, k):
+    """Time from now to tick ``k``."""
+    high, low = place_of_tick(model, run, transition, k)
+    return time_until(run, high, low)
 
 
 @njit(**KERNEL)
@@ -70,16 +71,10 @@ def first_from(model, run, transition, beyond):
     if kind == EVERY:
         k = math.floor((now - run.ticks[first + 1]) / run.ticks[first]) - 1
     else:
-        k, high = 0, model.first_tick[transition + 1] - first
-        while k < high:
-            middle = (k + high) // 2
-            if run.ticks[first + middle] < now:
-                k = middle + 1
-            else:
-                high = middle
-        k = max(k - 1, 0)
+        # One tick earlier than the last that has passed: that one may be of this instant.
+        k = max(knots_passed(run.ticks, first, model.first_tick[transition + 1], now) - 2, 0)
     while True:
-        left = until(run, place_of_tick(model, run, transition, k))
+        left = time_to_tick(model, run, transition, k)
         band = rounding_of_tick(model, run, transition, k)
         if left > band or (left >= -band and not beyond):
             return k
@@ -134,7 +129,7 @@ def next_tick(model, run):
     for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
         transition = model.clocks[slot]
         k = number_of_tick(model, run, transition)
-        left = until(run, place_of_tick(model, run, transition, k))
+        left = time_to_tick(model, run, transition, k)
         if left < least:
             found, least = transition, left
     if found == NO_TRANSITION:
@@ -145,12 +140,9 @@ def next_tick(model, run):
 @njit(**KERNEL)
 def go_to_tick(model, run, transition):
     """Set the clock of the run to the next tick of a clock."""
-    high, low = place_of_tick(model, run, transition, number_of_tick(model, run, transition))
-    while model.period > 0.0 and high >= model.period:
-        high, lost = sum_in_two_parts(high, -model.period)
-        high, low = sum_in_two_parts(high, lost + low)
-        run.cycle += 1
-    run.phase, run.phase_low = high, low
+    k = number_of_tick(model, run, transition)
+    run.phase, run.phase_low = place_of_tick(model, run, transition, k)
+    forward(run, model.period, 0.0)
 
 
 @njit(**KERNEL)
@@ -160,7 +152,7 @@ def ticking(model, run, work):
     for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
         transition = model.clocks[slot]
         k = number_of_tick(model, run, transition)
-        left = until(run, place_of_tick(model, run, transition, k))
+        left = time_to_tick(model, run, transition, k)
         if left > rounding_of_tick(model, run, transition, k):
             continue
         if allowed(model, transition, run.phase, run.y, work.scalar):

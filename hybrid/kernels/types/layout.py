@@ -21,6 +21,8 @@ from hybrid.kernels.types.kinds import (
 from hybrid.kernels.types.structure import Structure
 
 EPSILON = 2.220446049250313e-16
+# Factor ``U`` that splits a number ``x``: ``U x - (U x - x)`` has the upper half of the digits of ``x``.
+UPPER_HALF = 2.0**27 + 1.0
 
 VECTOR_FUNCTION = function(None, INTEGER, REAL, VECTOR, VECTOR, VECTOR)
 SERIES_FUNCTION = function(None, INTEGER, REAL, VECTOR, VECTOR, INTEGER, MATRIX)

@@ -1,4 +1,4 @@
-"""What kernels know of the clocks of a system, as index arrays."""
+"""The graph of a system as index arrays, with what kernels know of its clocks."""
 
 from __future__ import annotations
 
@@ -16,10 +16,24 @@ if TYPE_CHECKING:
     from hybrid.compiler.emitted import Emitted
 
 
+def indices(values: Iterable[Any]) -> np.ndarray:
+    """Whole numbers, or truths, as kernels get them."""
+    return np.array([int(value) for value in values], dtype=np.int64)
+
+
+def leaving(system: HybridSystem, chosen: Callable[[Transition], bool]) -> tuple[np.ndarray, np.ndarray]:
+    """The chosen transitions that leave each mode, as listed: first places, and indices."""
+    pairs = [*enumerate(system.transitions)]
+    of_modes = [
+        [i for i, each in pairs if each.source == name and chosen(each)] for name in system.mode_names
+    ]
+    return indices(accumulate(map(len, of_modes), initial=0)), indices(chain.from_iterable(of_modes))
+
+
 def clock_arrays(system: HybridSystem, emitted: Emitted) -> dict[str, np.ndarray]:
     """The fields of ``hybrid.kernels.types.layout.Model`` that tell of clocks."""
     transitions = system.transitions
-    first_clock, clocks = _clocks(system)
+    first_clock, clocks = leaving(system, lambda each: each.clock is not None)
 
     def clock_of(index: int) -> Any:
         clock = transitions[index].clock
@@ -28,19 +42,15 @@ def clock_arrays(system: HybridSystem, emitted: Emitted) -> dict[str, np.ndarray
         return type(clock), emitted.surface[index], clock.quantities if clock.number == AT else ()
 
     return {
-        "clock": _whole(0 if each.clock is None else each.clock.number for each in transitions),
+        "clock": indices(0 if each.clock is None else each.clock.number for each in transitions),
         "first_clock": first_clock,
         "clocks": clocks,
-        "first_tick": _whole(system.first_tick),
-        "tick_of": _whole(_first_like(len(transitions), lambda i: _own_name(transitions[i]))),
-        "clock_of": _whole(_first_like(len(transitions), clock_of)),
-        "whole_mode": _whole(system.whole_modes.index(each.part_of or each.name) for each in system.modes),
-        "enters": _whole(_enters(system, each) for each in transitions),
+        "first_tick": indices(system.first_tick),
+        "tick_of": indices(_first_like(len(transitions), lambda i: _own_name(transitions[i]))),
+        "clock_of": indices(_first_like(len(transitions), clock_of)),
+        "whole_mode": indices(system.whole_modes.index(each.part_of or each.name) for each in system.modes),
+        "enters": indices(_enters(system, each) for each in transitions),
     }
-
-
-def _whole(values: Iterable[int]) -> np.ndarray:
-    return np.array(list(values), dtype=np.int64)
 
 
 def _own_name(transition: Transition) -> str:
@@ -61,11 +71,3 @@ def _enters(system: HybridSystem, transition: Transition) -> bool:
     source, target = map(system.mode_index, (transition.source, transition.target))
     whole, other = system.modes[source].part_of, system.modes[target].part_of
     return transition.part_of is not None or whole is None or whole != other
-
-
-def _clocks(system: HybridSystem) -> tuple[np.ndarray, np.ndarray]:
-    """The transitions with clocks that leave each mode: first places, and indices."""
-    pairs = [*enumerate(system.transitions)]
-    of_modes = [[i for i, each in pairs if each.source == name and each.clock] for name in system.mode_names]
-    ends = accumulate(map(len, of_modes), initial=0)
-    return _whole(ends), _whole(chain.from_iterable(of_modes))
