@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from hybrid.expression.code import assignments, unprintable
+import math
+
+from hybrid.compiler.statements.code import Statement, at, put
+from hybrid.compiler.statements.values import assignments, unprintable
 from hybrid.expression.derivatives import close_gates, partial_derivatives
 from hybrid.expression.nodes import ONE, Expression, Symbol, add
 from hybrid.expression.tracing import Symbols
 
 # Not every guard has a compiled curvature; then kernels take a difference quotient.
-UNKNOWN = ["out[0] = nan"]
+UNKNOWN = [put(at("out", 0), math.nan)]
 
 
-def curvature(guard: Expression | None, is_affine: bool, symbols: Symbols) -> list[str]:
+def curvature(guard: Expression | None, is_affine: bool, symbols: Symbols) -> list[Statement]:
     """Statements for ``d^2/ds^2 g(t + s, x + s v)`` at ``s = 0``, which read ``v`` from ``out (n,)``."""
     if is_affine:
-        return ["out[0] = 0.0"]
+        return [put(at("out", 0), 0.0)]
     if guard is None:
         return UNKNOWN
     vector = [*(Symbol(f"out[{i}]") for i in range(len(symbols.x))), ONE]
@@ -26,4 +29,4 @@ def curvature(guard: Expression | None, is_affine: bool, symbols: Symbols) -> li
     second = close_gates(along(along(guard)))
     if unprintable([second]) is not None:
         return UNKNOWN
-    return assignments(["out[0]"], [second])
+    return assignments([at("out", 0)], [second])

@@ -10,7 +10,7 @@ tangent vectors. It writes their derivatives and, one place further, the diverge
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -20,23 +20,24 @@ import attrs
 from hybrid.compiler.bounds.forcing import forcings
 from hybrid.compiler.bounds.program import programs
 from hybrid.compiler.bounds.residues import residue_of_guard, residues
-from hybrid.compiler.cases import function_of_index
+from hybrid.compiler.cases import cases_of_index, function_text
 from hybrid.compiler.curvature import curvature
 from hybrid.compiler.emitted import Emitted, Propagator
-from hybrid.compiler.jacobians import slope_columns, without_zeros, zeros_first
+from hybrid.compiler.jacobians import cells, gradient, slope_columns, with_time, zeros_first
 from hybrid.compiler.opaque import SLOPES, OpaqueFunction, check_plain
 from hybrid.compiler.parts import PARTS
 from hybrid.compiler.places import placed, places_of
 from hybrid.compiler.propagators.choice import propagator
 from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.readers import is_free, readers
+from hybrid.compiler.statements.code import Code, Statement, Term, at, call, get, put
+from hybrid.compiler.statements.values import assignments, unprintable
 from hybrid.compiler.steep import fields_at_crossings, steep_at_guards, steep_inside
 from hybrid.compiler.surfaces import surfaces
 from hybrid.compiler.tables import Tables
 from hybrid.compiler.traced import Traces, expressions_of, period_of
 from hybrid.compiler.written import Written, beyond_guards, variational
 from hybrid.errors import ModelError
-from hybrid.expression.code import IMPORTS, assignments, unprintable
 from hybrid.expression.continuity import jumps_of, may_be_abrupt, may_jump
 from hybrid.expression.derivatives import jacobian_of
 from hybrid.expression.graph import forget, nodes_of
@@ -122,12 +123,12 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
         for mode, field, around in zip(system.modes, fields, boundaries, strict=True)
     ]
     crossing, at_crossings = fields_at_crossings(system, fields, steep, guards, resets, boundaries, symbols)
-    jacobians = [without_zeros(field.derivative, n) for field in evaluated]
+    jacobians = [with_time(field.derivative, n) for field in evaluated]
     series = [each.series for each in propagators]
     places = places_of(series, with_room=system.growth is not None)
-    bodies: dict[str, list[Sequence[str]]] = {
+    bodies: dict[str, Sequence[Sequence[Statement]]] = {
         "field": [*(field.value for field in evaluated), *at_crossings],
-        "field_jacobian": [*jacobians],
+        "field_jacobian": jacobians,
         "variational_field": [
             writer.remembered(
                 ("variational", id(mode.field), id(mode.jacobian), tuple(around)),
@@ -136,7 +137,7 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
             for mode, field, around in zip(system.modes, evaluated, boundaries, strict=True)
         ],
         "guard": [*(guard.value for guard in guards), *(condition.value for condition in conditions)],
-        "guard_gradient": [guard.derivative for guard in guards],
+        "guard_gradient": [gradient(guard.derivative, n) for guard in guards],
         "guard_curvature": [
             curvature(expression, straight, symbols)
             for expression, straight in zip(traced, affine, strict=True)
@@ -161,9 +162,7 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
     tables = Tables(len(system.parameters))
     return Emitted(
         texts={
-            part: tables.located(
-                "\n\n".join((IMPORTS, *(function_of_index(name, bodies[name]) for name in names)))
-            )
+            part: tables.located("".join(function_text(name, cases_of_index(bodies[name])) for name in names))
             for part, names in PARTS.items()
         },
         opaque=writer.opaque,
@@ -251,7 +250,7 @@ class _Writer:
         return self.remembered(("written", *function.identity), lambda: self._write(function))
 
     def _write(self, function: ModelFunction) -> Written:
-        targets = ["out[0]"] if function.size is None else [f"out[{i}]" for i in range(function.size)]
+        targets = [at("out", i) for i in range(function.size or 1)]
         try:
             expressions = self.traced(function)
             jacobian = jacobian_of(expressions[: function.kept], self.symbols.variables)
@@ -261,7 +260,7 @@ class _Writer:
         except ModelError as error:
             return self._write_opaque(function, targets, error)
         if function.derivative is None:
-            derivative = assignments(self._cells(function), [entry for row in jacobian for entry in row])
+            derivative = cells(self._cells(function), [entry for row in jacobian for entry in row])
         else:
             derivative = self._given_derivative(function)
         given = function.derivative is not None
@@ -275,8 +274,8 @@ class _Writer:
         try:
             [value] = self.traced(function)
         except ModelError as reason:
-            return Written(self._opaque_value(function, ["out[0]"], reason), [])
-        return Written(assignments(["out[0]"], [value]), [], [value])
+            return Written(self._opaque_value(function, [at("out", 0)], reason), [])
+        return Written(assignments([at("out", 0)], [value]), [], [value])
 
     def surfaces(self, traced: Sequence[Expression | None]) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """The zero sets of all guards, as `hybrid.compiler.surfaces.surfaces` numbers them."""
@@ -289,10 +288,8 @@ class _Writer:
 
     def _identity(self) -> Written:
         n = self.system.dimension
-        value = assignments([f"out[{i}]" for i in range(n)], self.symbols.x)
-        cells = [f"out[{i}, {j}]" for i in range(n) for j in range(n + 1)]
-        entries = [ONE if i == j else ZERO for i in range(n) for j in range(n + 1)]
-        return Written(value, assignments(cells, entries), [*self.symbols.x])
+        value = assignments([at("out", i) for i in range(n)], self.symbols.x)
+        return Written(value, [put(at("out", i, i), 1.0) for i in range(n)], [*self.symbols.x])
 
     def traced(self, function: ModelFunction, *, derivative: bool = False) -> list[Expression]:
         """Expressions of a function or of its derivative; ModelError if it has none that can be compiled."""
@@ -300,7 +297,7 @@ class _Writer:
         _check_printable(expressions)
         return expressions
 
-    def _write_opaque(self, function: ModelFunction, targets: Sequence[str], reason: ModelError) -> Written:
+    def _write_opaque(self, function: ModelFunction, targets: Sequence[Code], reason: ModelError) -> Written:
         value = self._opaque_value(function, targets, reason)
         if function.derivative is not None:
             return Written(value, self._given_derivative(function))
@@ -313,21 +310,26 @@ class _Writer:
             ) from (reason.__cause__ or error)
         return Written(value, self._complex_step(function, reason))
 
-    def _opaque_value(self, function: ModelFunction, targets: Sequence[str], reason: ModelError) -> list[str]:
+    def _opaque_value(
+        self, function: ModelFunction, targets: Sequence[Code], reason: ModelError
+    ) -> list[Statement]:
         name = self._opaque_name(function, reason)
-        values = [f"r[{i}]" if i < function.returned else "0.0" for i in range(len(targets))]
-        return [f"r = {name}(t, x, p)", *map(" = ".join, zip(targets, values, strict=True))]
+        values = [_item("r", i) if i < function.returned else 0.0 for i in range(len(targets))]
+        return [_called("r", name), *map(put, targets, values)]
 
-    def _complex_step(self, function: ModelFunction, reason: ModelError) -> list[str]:
+    def _complex_step(self, function: ModelFunction, reason: ModelError) -> list[Statement]:
         name, columns = self._opaque_name(function, reason), self.system.dimension + 1
         self.opaque[name] = attrs.evolve(self.opaque[name], slopes=True)
-        lines = [f"r{j} = {name}{SLOPES}(t, x, p, {j})" for j in range(columns)]
-        cells = iter(self._cells(function))
-        lines += [f"{next(cells)} = r{j}[{i}]" for i in range(function.kept) for j in range(columns)]
-        return lines + self._memory_cells(function, cells)
+        statements = [_called(f"r{j}", f"{name}{SLOPES}", j) for j in range(columns)]
+        statements += [
+            put(self._cell(function, i, j), _item(f"r{j}", i))
+            for i in range(function.kept)
+            for j in range(columns)
+        ]
+        return statements + self._memory_cells(function)
 
-    def _given_derivative(self, function: ModelFunction) -> list[str]:
-        n, cells = self.system.dimension, self._cells(function)
+    def _given_derivative(self, function: ModelFunction) -> list[Statement]:
+        n, places = self.system.dimension, self._cells(function)
         try:
             entries = self.traced(function, derivative=True)
         except ModelError as reason:
@@ -335,29 +337,35 @@ class _Writer:
         width = len(entries) // function.rows
         zeros = [ZERO] * (n + 1 - width)
         rows = [[*entries[i * width : (i + 1) * width], *zeros] for i in range(function.rows)]
-        return assignments(cells, [entry for row in rows for entry in row])
+        return cells(places, [entry for row in rows for entry in row])
 
-    def _opaque_derivative(self, function: ModelFunction, reason: ModelError) -> list[str]:
-        n = self.system.dimension
-        width = n + 1 if derivative_has_time_column(self.system.variables, function) else n
+    def _opaque_derivative(self, function: ModelFunction, reason: ModelError) -> list[Statement]:
+        width = self.system.dimension + derivative_has_time_column(self.system.variables, function)
         name = self._opaque_name(function, reason, width)
-        cells = iter(self._cells(function))
-        lines = [f"r = {name}(t, x, p)"]
-        for i in range(function.kept):
-            entries = [*(f"r[{i * width + j}]" for j in range(width)), *["0.0"] * (n + 1 - width)]
-            lines += [f"{next(cells)} = {entry}" for entry in entries]
-        return lines + self._memory_cells(function, cells)
+        statements = [_called("r", name)]
+        statements += [
+            put(self._cell(function, i, j), _item("r", i * width + j))
+            for i in range(function.kept)
+            for j in range(width)
+        ]
+        return statements + self._memory_cells(function)
 
-    def _memory_cells(self, function: ModelFunction, cells: Iterator[str]) -> list[str]:
+    def _memory_cells(self, function: ModelFunction) -> list[Statement]:
         """Statements for the rows of a derivative that are not those of the user's function."""
         rows = function.memory_rows(self.system.dimension + 1)
-        return [f"{next(cells)} = {entry}" for row in rows for entry in row]
+        return [
+            put(self._cell(function, i, j), entry)
+            for i, row in enumerate(rows, function.kept)
+            for j, entry in enumerate(row)
+            if entry
+        ]
 
-    def _cells(self, function: ModelFunction) -> list[str]:
+    def _cells(self, function: ModelFunction) -> list[Code]:
         columns = range(self.system.dimension + 1)
-        if function.size is None:
-            return [f"out[{j}]" for j in columns]
-        return [f"out[{i}, {j}]" for i in range(function.size) for j in columns]
+        return [self._cell(function, i, j) for i in range(function.size or 1) for j in columns]
+
+    def _cell(self, function: ModelFunction, i: int, j: int) -> Code:
+        return at("out", j) if function.size is None else at("out", i, j)
 
     def _opaque_name(self, function: ModelFunction, reason: ModelError, width: int | None = None) -> str:
         """Name of a function that stays opaque; with ``width``, of its derivative of so many columns."""
@@ -377,6 +385,16 @@ class _Writer:
         )
         self.opaque[name] = opaque
         return name
+
+
+def _called(target: str, name: str, *arguments: Term) -> Statement:
+    """The statement that calls a function of the user."""
+    return put(get(target), call(name, *map(get, ("t", "x", "p")), *arguments))
+
+
+def _item(name: str, place: int) -> Code:
+    """One of the numbers that a function of the user has returned."""
+    return call("item", get(name), place)
 
 
 def _check_printable(expressions: Iterable[Expression]) -> None:

@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from hybrid.compiler.opaque import OpaqueFunction
+from hybrid.compiler.statements.code import Statement
 from hybrid.kernels.types.codes import IN_TIME, PROPAGATORS
 
 # What marks a fact that kernels read as an array of whole numbers.
@@ -30,8 +31,8 @@ class Series:
         vectors.
     """
 
-    statements: tuple[str, ...] = ()
-    tangent_statements: tuple[str, ...] = ()
+    statements: tuple[Statement, ...] = ()
+    tangent_statements: tuple[Statement, ...] = ()
     columns: int = 0
     table_columns: int = 0
     tangent_columns: int = 0
@@ -112,9 +113,9 @@ class Emitted:
     Parameters
     ----------
     texts
-        By part of ``hybrid.compiler.parts``: text of a module with the functions of the part. Behind the
-        guards, ``guard`` has their conditions; for a guard without one it leaves ``out`` alone. The same
-        model gives the same text, in any process.
+        By part of ``hybrid.compiler.parts``: the functions of the part as text (``hybrid.compiler.cases``).
+        Behind the guards, ``guard`` has their conditions; for a guard without one it leaves ``out`` alone.
+        The same model gives the same text, in any process.
     affine_guard
         By transition: whether the guard's gradient, its slope in time included, is proved to depend on
         parameters only.

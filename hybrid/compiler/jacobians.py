@@ -2,34 +2,55 @@
 
 from __future__ import annotations
 
-import re
+from collections.abc import Iterable, Sequence
+from typing import Any
 
-# A cell of a matrix, and how the statement for a cell that is zero ends.
-CELL = re.compile(r"\bout\[(\d+), (\d+)\]")
-ZERO = "] = 0.0"
+from hybrid.compiler.statements.code import Code, Statement, at, get, loop, put
+from hybrid.compiler.statements.values import assignments
+from hybrid.expression.nodes import ZERO, Expression
+
 # So many zeros are written by a loop.
 MANY_ZEROS = 50
 
 
-def zeros_first(statements: list[str], n: int) -> list[str]:
-    """Statements for a matrix ``(n, n + 1)``; many entries that are zero are written by a loop."""
-    others = [each for each in statements if not each.endswith(ZERO)]
-    if len(statements) - len(others) < MANY_ZEROS:
-        return statements
-    loop = [f"for i in range({n}):", f"    for j in range({n + 1}):", "        out[i, j] = 0.0"]
-    return [*loop, *others]
+def cells(places: Sequence[Code], entries: Iterable[Expression]) -> list[Statement]:
+    """Statements for the cells of a derivative that are not zero."""
+    found = [(place, entry) for place, entry in zip(places, entries, strict=True) if entry is not ZERO]
+    return assignments([place for place, _ in found], [entry for _, entry in found])
 
 
-def without_zeros(statements: list[str], n: int) -> list[str]:
-    """Statements for the Jacobian of a field but for the zeros left of the last column, that of time."""
-    return [each for each in statements if not each.endswith(ZERO) or f", {n}] = " in each]
+def written_cells(statements: Iterable[Statement]) -> list[tuple[int, ...]]:
+    """The cells of ``out`` that statements write, in order."""
+    places: list[Any] = [statement[1] for statement in statements if statement[0] == "set"]
+    return [tuple(place[2:]) for place in places if place[:2] == ("at", "out")]
 
 
-def slope_columns(statements: list[str], n: int) -> tuple[tuple[int, ...], ...]:
+def gradient(statements: Sequence[Statement], n: int) -> list[Statement]:
+    """Statements for all cells of a gradient ``(n + 1,)``."""
+    known = set(written_cells(statements))
+    return [*statements, *(put(at("out", j), 0.0) for j in range(n + 1) if (j,) not in known)]
+
+
+def zeros_first(statements: Sequence[Statement], n: int) -> list[Statement]:
+    """Statements for all cells of a matrix ``(n, n + 1)``; a loop writes zeros if there are many."""
+    known = set(written_cells(statements))
+    if n * (n + 1) - len(known) < MANY_ZEROS:
+        zeros = ((i, j) for i in range(n) for j in range(n + 1) if (i, j) not in known)
+        return [*statements, *(put(at("out", i, j), 0.0) for i, j in zeros)]
+    row = [loop("j", 0, n + 1, [put(at("out", get("i"), get("j")), 0.0)])]
+    return [loop("i", 0, n, row), *statements]
+
+
+def with_time(statements: Sequence[Statement], n: int) -> list[Statement]:
+    """Statements for the Jacobian of a field: cells that are zero are left alone, but for those of time."""
+    known = set(written_cells(statements))
+    return [*statements, *(put(at("out", i, n), 0.0) for i in range(n) if (i, n) not in known)]
+
+
+def slope_columns(statements: Sequence[Statement], n: int) -> tuple[tuple[int, ...], ...]:
     """By row, the columns of the state that these statements write."""
-    cells = [map(int, cell.groups()) for each in statements if (cell := CELL.match(each))]
     columns: list[list[int]] = [[] for _ in range(n)]
-    for row, column in cells:
+    for row, column in sorted(written_cells(statements)):
         if column < n:
             columns[row].append(column)
     return tuple(map(tuple, columns))

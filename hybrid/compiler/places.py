@@ -8,6 +8,7 @@ from itertools import accumulate
 import attrs
 
 from hybrid.compiler.emitted import Series
+from hybrid.compiler.statements.code import Statement, whole
 from hybrid.compiler.taylor.loops import padded
 from hybrid.kernels.types.codes import WIDE
 
@@ -42,9 +43,9 @@ def _power_of_two_from(count: int) -> int:
     return 1 << (count - 1).bit_length()
 
 
-def placed(places: Places, statements: Sequence[Sequence[str]]) -> list[Sequence[str]]:
+def placed(places: Places, bodies: Sequence[Sequence[Statement]]) -> list[Sequence[Statement]]:
     """The bodies of the series of all modes, each with its columns."""
     return [
-        [f"table = {table}", f"vectors = {places.vectors}", *lines] if lines else []
-        for table, lines in zip(places.tables, statements, strict=True)
+        [whole("table", table), whole("vectors", places.vectors), *body] if body else []
+        for table, body in zip(places.tables, bodies, strict=True)
     ]

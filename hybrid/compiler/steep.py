@@ -10,9 +10,10 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from hybrid.compiler.propagators.equations import Boundary, known_positive
+from hybrid.compiler.statements.code import Statement, at
+from hybrid.compiler.statements.values import assignments
 from hybrid.compiler.taylor.roots import is_multiple
 from hybrid.compiler.written import Written, beyond_guards
-from hybrid.expression.code import assignments
 from hybrid.expression.graph import all_replaced, contains, is_whole, mentions, nodes_of, replaced
 from hybrid.expression.nodes import ONE, ZERO, Expression, Power, Symbol, order_of
 from hybrid.expression.operations import (
@@ -85,13 +86,13 @@ def fields_at_crossings(
     resets: Sequence[Written],
     boundaries: Sequence[Sequence[Boundary]],
     symbols: Symbols,
-) -> tuple[tuple[tuple[int, int], ...], list[list[str]]]:
+) -> tuple[tuple[tuple[int, int], ...], list[list[Statement]]]:
     """The numbers of the fields before and behind each transition, and the statements of further fields.
 
     A further field has steep powers that are zero exactly, as they are on the guard of the transition.
     Rounding leaves a guard of the size 1e-16 beside zero, whose fourth root is 1e-4.
     """
-    numbers, bodies = [], list[list[str]]()
+    numbers, bodies = [], list[list[Statement]]()
 
     def number_of(mode: str | None, guard: Written, states: Sequence[Expression] | None) -> int:
         if mode is None:
@@ -105,7 +106,7 @@ def fields_at_crossings(
         if not zeros:
             return index
         left = all_replaced(expressions, zeros)
-        value = assignments([f"out[{i}]" for i in range(len(left))], left)
+        value = assignments([at("out", i) for i in range(len(left))], left)
         bodies.append(beyond_guards(Written(value, [], left, [], True), boundaries[index], symbols).value)
         return len(fields) + len(bodies) - 1
 

@@ -22,8 +22,8 @@ from hybrid.expression.tracing import model_symbols
 from hybrid.system.functions import condition_function, field_function, guard_function
 from hybrid.system.graph import HybridSystem
 
-# The name of a table in generated text, before it is known where its numbers begin.
-NAME = re.compile(r"\bT[0-9a-f]{16}\b")
+# The name of a table in the text of code, before it is known where its numbers begin.
+NAME = re.compile(r'"(T[0-9a-f]{16})"')
 # The rounding of an affine argument and of its inverse, as a share of the terms, with a margin.
 MARGIN = 16.0 * float(np.finfo(float).eps)
 # Halvings that bring an interval of this size down to two neighbouring numbers, unless these are next to 0.
@@ -46,7 +46,7 @@ class Tables:
 
     def located(self, text: str) -> str:
         """Generated text with the places of tables for their names."""
-        return NAME.sub(lambda found: str(self.place(Pieces.known[found[0]])), text)
+        return NAME.sub(lambda found: str(self.place(Pieces.known[found[1]])), text)
 
     def packed(self) -> str:
         """The numbers of all tables as text."""

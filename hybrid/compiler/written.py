@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
+from operator import add
 
 import attrs
 
-from hybrid.compiler.jacobians import CELL
+from hybrid.compiler.jacobians import cells
 from hybrid.compiler.propagators.equations import Boundary, known_positive
+from hybrid.compiler.statements.code import Code, Statement, Term, at, call, get, loop, put
+from hybrid.compiler.statements.values import assignments
 from hybrid.compiler.taylor.roots import is_multiple
-from hybrid.expression.code import assignments
 from hybrid.expression.graph import all_replaced, is_negative, is_positive, is_whole, mentions, nodes_of
 from hybrid.expression.nodes import ZERO, Expression, Power, power
 from hybrid.expression.operations import CubeRoot, Less, Maximum, Select
@@ -20,10 +23,13 @@ from hybrid.expression.tracing import Symbols
 
 @attrs.frozen
 class Written:
-    """Statements for a function and its derivative; the expressions behind them if it was traced."""
+    """Statements for a function and its derivative, but for cells that are proved zero.
 
-    value: list[str]
-    derivative: list[str]
+    ``expressions`` and ``jacobian`` are the expressions behind them if it was traced.
+    """
+
+    value: list[Statement]
+    derivative: list[Statement]
     expressions: list[Expression] | None = None
     jacobian: list[list[Expression]] | None = None
     given: bool = False
@@ -48,9 +54,9 @@ def beyond_guards(field: Written, boundaries: Sequence[Boundary], symbols: Symbo
     flat = all_replaced(entries, slopes)
     jacobian = [flat[i * (n + 1) : (i + 1) * (n + 1)] for i in range(n)]
     if not field.given:
-        cells = [f"out[{i}, {j}]" for i in range(n) for j in range(n + 1)]
-        derivative = assignments(cells, [entry for row in jacobian for entry in row])
-    value = assignments([f"out[{i}]" for i in range(n)], expressions)
+        places = [at("out", i, j) for i in range(n) for j in range(n + 1)]
+        derivative = cells(places, [entry for row in jacobian for entry in row])
+    value = assignments([at("out", i) for i in range(n)], expressions)
     return Written(value, derivative, expressions, jacobian, field.given)
 
 
@@ -92,22 +98,39 @@ def _slopes_inside(
     return found
 
 
-def variational(field: Written, n: int) -> list[str]:
+def variational(field: Written, n: int) -> list[Statement]:
     """Statements for the field and its Jacobian times any number of tangent vectors, in one pass.
 
     Entries that are proved zero cost nothing, and what field and Jacobian share is computed once.
     """
-    entry = {(i, j): f"a{i}_{j}" for i in range(n) for j in range(n)}
     if field.expressions is None or field.jacobian is None or field.given:
-        local = [CELL.sub(r"a\1_\2", statement) for statement in field.derivative]
-        lines = [*field.value, *local]
+        statements = [*field.value, *(("set", _entry_of(place), term) for _, place, term in field.derivative)]
+        known = {place[2:] for _, place, _ in field.derivative if place[0] == "at"}
     else:
-        entry = {(i, j): name for (i, j), name in entry.items() if field.jacobian[i][j] is not ZERO}
-        targets = [*(f"out[{i}]" for i in range(n)), *entry.values()]
-        lines = assignments(targets, [*field.expressions, *(field.jacobian[i][j] for i, j in entry)])
-    lines.append(f"for v in range({n}, len(x), {n}):")
-    for i in range(n):
-        terms = [f"{entry[i, j]}*x[v + {j}]" for j in range(n) if (i, j) in entry]
-        lines.append(f"    out[v + {i}] = {' + '.join(terms) or '0.0'}")
-    trace = [entry[i, i] for i in range(n) if (i, i) in entry]
-    return [*lines, f"out[len(x)] = {' + '.join(trace) or '0.0'}"]
+        rows = [(i, j, entry) for i, row in enumerate(field.jacobian) for j, entry in enumerate(row[:n])]
+        rows = [(i, j, entry) for i, j, entry in rows if entry is not ZERO]
+        known = {(i, j) for i, j, _ in rows}
+        targets = [*(at("out", i) for i in range(n)), *(_entry(i, j) for i, j, _ in rows)]
+        statements = assignments(targets, [*field.expressions, *(entry for _, _, entry in rows)])
+    by_row: list[list[Term]] = [[] for _ in range(n)]
+    for i, j in sorted(known):
+        if j < n:
+            by_row[i].append(_entry(i, j) * at("x", get("v") + j))
+    moved = [put(at("out", get("v") + i), _added(terms)) for i, terms in enumerate(by_row)]
+    trace = _added([_entry(i, i) for i in range(n) if (i, i) in known])
+    length = call("length", "x")
+    return [*statements, loop("v", n, length, moved, step=n), put(at("out", length), trace)]
+
+
+def _entry(i: int, j: int) -> Code:
+    """The local variable for an entry of the Jacobian."""
+    return get(f"a{i}_{j}")
+
+
+def _entry_of(place: Code) -> Code:
+    """The local variable in the place of a cell of ``out``; other places as they are."""
+    return _entry(*place[2:]) if place[:2] == ("at", "out") else place
+
+
+def _added(terms: Sequence[Term]) -> Term:
+    return reduce(add, terms) if terms else 0.0

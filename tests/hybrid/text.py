@@ -3,11 +3,11 @@
 import ctypes
 
 import numpy as np
+from hybrid.expression.code import IMPORTS
 
 from hybrid.compiler.llvm.engine import load
 from hybrid.compiler.llvm.lowering import MATRIX_SIGNATURE, SERIES_SIGNATURE, VECTOR_SIGNATURE, parsed
 from hybrid.compiler.llvm.machine import machine_code
-from hybrid.expression.code import IMPORTS
 
 SIGNATURES = (VECTOR_SIGNATURE, MATRIX_SIGNATURE, SERIES_SIGNATURE)
 

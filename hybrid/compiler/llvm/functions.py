@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -10,15 +11,15 @@ import numpy as np
 
 from hybrid.compiler.cache.folder import keep, source_key
 from hybrid.compiler.cache.store import kept_of_model, models_folder
-from hybrid.compiler.cases import Case, cases_of, function_text
+from hybrid.compiler.cases import Case, cases_in, function_text
 from hybrid.compiler.llvm.engine import load, processor
 from hybrid.compiler.llvm.lowering import (
     MATRIX_SIGNATURE,
     SERIES_SIGNATURE,
     VECTOR_SIGNATURE,
     CaseTable,
+    Function,
     OwnFunction,
-    parsed,
 )
 from hybrid.compiler.llvm.machine import machine_code
 from hybrid.compiler.opaque import compiled_functions
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 # Between the name of a function and the number of a case of it.
 CASE = "_case_"
 # The case of indices without statements.
-NOTHING: Case = (), ("pass",)
+NOTHING: Case = (), "[]"
 # Number of texts whose machine code stays in memory after their systems are deleted.
 MOST_SOURCES = 128
 SIGNATURES = {
@@ -75,13 +76,15 @@ def compiled_stage(emitted: Emitted, part: str, known: dict[Any, Any], size: int
     Each case of a function is compiled by itself, once for all stages; ``known`` keeps them. For each name a
     stage adds a table of the ``size`` addresses of its cases, and a function that calls them by the table.
     """
-    cases = {name: [*cases_of(emitted.texts[part], name), NOTHING] for name in PARTS[part]}
+    cases: dict[str, list[Case]] = {name: [NOTHING] for name in PARTS[part]}
+    for name, case in cases_in(emitted.texts[part]):
+        cases[name].insert(-1, case)
     new = dict.fromkeys(
         (name, body) for name, each in cases.items() for _, body in each if (name, body) not in known
     )
     if new:
         named = {f"{name}{CASE}{number}": (name, body) for number, (name, body) in enumerate(new)}
-        source = "\n\n".join(function_text(name, [((), body)]) for name, (_, body) in named.items())
+        source = "".join(function_text(name, [((), body)]) for name, (_, body) in named.items())
         compiled = shared_functions(source, tuple(named))
         known |= {key: compiled[name] for name, key in named.items()}
     tables: dict[str, CaseTable] = {}
@@ -93,7 +96,7 @@ def compiled_stage(emitted: Emitted, part: str, known: dict[Any, Any], size: int
             needs.append(known[name, body])
         needs.append(addresses)
         tables[f"{name}{CASE}"] = CaseTable(addresses.ctypes.data)
-    source = "\n\n".join(function_text(name, [((), (f"{name}{CASE}()",))]) for name in PARTS[part])
+    source = "".join(function_text(name, [((), f'[["do",["{name}{CASE}"]]]')]) for name in PARTS[part])
     return load(_code(source, PARTS[part], tables), PARTS[part], needs)
 
 
@@ -109,10 +112,12 @@ def shared_functions(source: str, names: tuple[str, ...]) -> dict[str, Compiled]
 
 
 def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction | CaseTable]) -> bytes:
-    functions = parsed(source)
-    kinds = [name.partition(CASE)[0] for name in names]
+    cases: dict[str, list[Any]] = {name: [] for name in names}
+    for name, (indices, body) in cases_in(source):
+        cases[name].append((indices, json.loads(body)))
+    kinds = {name: name.partition(CASE)[0] for name in names}
     wanted = [
-        (functions[name], SIGNATURES.get(kind, VECTOR_SIGNATURE), kind in FUSED)
-        for name, kind in zip(names, kinds, strict=True)
+        Function(name, SIGNATURES.get(kind, VECTOR_SIGNATURE), cases[name], kind in FUSED)
+        for name, kind in kinds.items()
     ]
     return machine_code(wanted, calls)

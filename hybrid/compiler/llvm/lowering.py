@@ -1,22 +1,19 @@
-"""Generated functions as LLVM's instructions, translated directly from their text.
+"""The code of compiled functions as LLVM's instructions.
 
-The text is Python on numbers: assignments, arithmetic, branches, loops over ranges, entries of arrays, and
-calls of ``CALLS``. The text alone gives the type of each value: a float, a 64-bit integer, a truth value, or
-four numbers in a register. So no types have to be inferred, and a function is ready in milliseconds.
+The code (``hybrid.compiler.statements.code``) alone gives the type of each value: a float, a 64-bit integer,
+a truth value, or four numbers in a register. So no types have to be inferred, and a function is ready in
+milliseconds.
 """
 
 from __future__ import annotations
 
-import ast
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import reduce
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import attrs
 from llvmlite import ir
 
-from hybrid.compiler.llvm.calls import CALLS, NUMBER, WHOLE, Call
-from hybrid.expression.branches import PARSER
+from hybrid.compiler.llvm.calls import CALLS, NUMBER, WHOLE
 from hybrid.kernels.instructions.loops import loop
 from hybrid.kernels.instructions.registers import Matrix, everywhere, vector_of
 from hybrid.kernels.types.codes import NARROW
@@ -42,19 +39,19 @@ ARRAYS = {
     for axes in (1, 2)
 }
 DATA, SHAPE = 4, 5
-COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 
 
 class LoweringError(Exception):
-    """A text uses syntax that generated functions do not have."""
+    """The code has something that compiled functions do not have."""
 
 
 @attrs.frozen
 class Vector:
-    """An array of numbers: the address of its data, and its length."""
+    """An array: the address of its data, its length, and the type of its entries."""
 
     data: Any
     length: Any
+    kind: Any = NUMBER
 
 
 @attrs.frozen
@@ -91,108 +88,119 @@ MATRIX_SIGNATURE = Signature(("index", "t", "x", "p", "out"), (WHOLE, NUMBER, 1,
 SERIES_SIGNATURE = Signature(("index", "t", "x", "p", "order", "out"), (WHOLE, NUMBER, 1, 1, WHOLE, 2))
 
 
-def lower(
-    module: Any,
-    written: ast.FunctionDef,
-    signature: Signature,
-    *,
-    fused: bool,
-    calls: Mapping[str, OwnFunction | CaseTable] = NO_CALLS,
-) -> None:
-    """Add a function to an LLVM module.
+@attrs.frozen
+class Function:
+    """A function to be compiled.
 
-    Parameters
+    Attributes
     ----------
-    module
-        The module, an ``llvmlite.ir.Module``.
-    written
-        The parsed function.
+    name
+        Its name in the machine code.
     signature
-        Types of its arguments.
+        Names and types of its arguments.
+    cases
+        Indices, with the statements for them; a case without indices is run for every index.
     fused
         Whether multiplications and additions may be fused.
-    calls
-        Functions of the user, and tables of cases, that the text may also call.
+    """
+
+    name: str
+    signature: Signature
+    cases: Sequence[Any]
+    fused: bool
+
+
+def lower(module: Any, written: Function, calls: Mapping[str, OwnFunction | CaseTable] = NO_CALLS) -> None:
+    """Add a function to an LLVM module; ``calls`` are functions of the user and tables of cases.
 
     Raises
     ------
     LoweringError
-        If the function has other arguments, or syntax that generated text does not have.
+        If the code has something that compiled functions do not have.
     """
-    names = tuple(argument.arg for argument in written.args.args)
-    if names != signature.names:
-        raise LoweringError(f"{written.name} takes {names}; a function of its kind takes {signature.names}")
-    kinds = [ARRAYS.get(kind, kind) for kind in signature.types]
+    kinds = [ARRAYS.get(kind, kind) for kind in written.signature.types]
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), written.name)
     function.attributes.add("nounwind")
-    _Body(function, signature, ("contract",) if fused else (), calls).write(written.body)
+    _Body(function, written, calls).write(written.cases)
 
 
 class _Body:
     """Writes the instructions of one function."""
 
     def __init__(
-        self,
-        function: Any,
-        signature: Signature,
-        flags: tuple[str, ...],
-        calls: Mapping[str, OwnFunction | CaseTable],
+        self, function: Any, written: Function, calls: Mapping[str, OwnFunction | CaseTable]
     ) -> None:
-        self.flags, self.calls = flags, calls
-        self.arguments = dict(zip(signature.names, function.args, strict=True))
+        self.flags, self.calls = ("contract",) if written.fused else (), calls
+        self.arguments = dict(zip(written.signature.names, function.args, strict=True))
         # Variables are allocated in the first block: LLVM turns only those into registers.
         self.front = ir.IRBuilder(function.append_basic_block("front"))
         self.builder = Builder(function.append_basic_block("body"))
         self.values: dict[str, Any] = {}
         self.variables: dict[str, Any] = {}
-        for name, kind, argument in zip(signature.names, signature.types, function.args, strict=True):
-            self.values[name] = argument if kind not in ARRAYS else self._array(kind, argument)
+        # Arrays of this function: their sizes, until they are first written.
+        self.arrays: dict[str, Vector | int] = {}
+        for (name, argument), kind in zip(self.arguments.items(), written.signature.types, strict=True):
+            self.values[name] = argument if kind not in ARRAYS else self._array_argument(kind, argument)
 
-    def _array(self, axes: int, argument: Any) -> Vector | Matrix:
+    def _array_argument(self, axes: int, argument: Any) -> Vector | Matrix:
         data = self.builder.extract_value(argument, DATA)
         sizes = [self.builder.extract_value(argument, [SHAPE, axis]) for axis in range(axes)]
         return Vector(data, sizes[0]) if axes == 1 else Matrix(self.builder, data, sizes[1])
 
-    def write(self, statements: Iterable[ast.stmt]) -> None:
+    def write(self, cases: Sequence[Any]) -> None:
         """Write the whole function."""
-        self.block(statements)
+        builder = self.builder
+        end = builder.append_basic_block("end")
+        if any(not indices for indices, _ in cases):
+            [(_, statements)] = cases
+            self.block(statements)
+            builder.branch(end)
+        else:
+            choice = builder.switch(self.arguments["index"], end)
+            for indices, statements in cases:
+                place = builder.append_basic_block("case")
+                for index in indices:
+                    choice.add_case(WHOLE(index), place)
+                builder.position_at_end(place)
+                self._alone(statements)
+                builder.branch(end)
+        builder.position_at_end(end)
         self.builder.ret_void()
         front, body, *_ = self.builder.function.basic_blocks
         self.front.position_at_end(front)
         self.front.branch(body)
 
-    def block(self, statements: Iterable[ast.stmt]) -> None:
+    def block(self, statements: Sequence[Any]) -> None:
         """Write statements in order."""
-        for statement in statements:
-            self.STATEMENTS.get(type(statement), _Body._unknown)(self, statement)
+        for kind, *parts in statements:
+            self.STATEMENTS[kind](self, *parts)
 
-    def value(self, node: ast.expr) -> Any:
-        """Write an expression, and return its value."""
-        return self.EXPRESSIONS.get(type(node), _Body._unknown)(self, node)
-
-    def _unknown(self, node: ast.AST) -> Any:
-        raise LoweringError(f"generated text must not contain {ast.unparse(node)!r}")
+    def value(self, term: Any) -> Any:
+        """Write a term, and return its value."""
+        if type(term) is int:
+            return WHOLE(term)
+        if type(term) is float:
+            return NUMBER(term)
+        operation, *parts = term
+        known = self.TERMS.get(operation)
+        return self._call(operation, parts) if known is None else known(self, operation, *parts)
 
     # Statements.
 
-    def _pass(self, node: ast.Pass) -> None:
-        pass
+    def _set(self, place: Any, term: Any) -> None:
+        self._store(place, self.value(term))
 
-    def _assign(self, node: ast.Assign) -> None:
-        value = self.value(node.value)
-        for target in node.targets:
-            self._store(target, value)
-
-    def _store(self, target: ast.expr, value: Any) -> None:
-        if isinstance(target, ast.Tuple):
-            for each, part in zip(target.elts, value, strict=True):
+    def _store(self, place: Any, value: Any) -> None:
+        kind, *parts = place
+        if kind == "several":
+            for each, part in zip(parts, value, strict=True):
                 self._store(each, part)
-        elif isinstance(target, ast.Subscript):
-            self.builder.store(self.number(value), self._place(target))
-        elif isinstance(target, ast.Name):
-            self._store_variable(target.id, value)
+        elif kind == "at":
+            name, *indices = parts
+            array = self._local(name, value) if name in self.arrays else self.values[name]
+            self.builder.store(self.number(value), self._place(array, indices))
         else:
-            self._unknown(target)
+            self._store_variable(parts[0], value)
 
     def _store_variable(self, name: str, value: Any) -> None:
         if name in self.values:
@@ -210,87 +218,100 @@ class _Body:
             raise LoweringError(f"{name} is {kept} in one place and {value.type} in another")
         self.builder.store(value, variable)
 
-    def _expression(self, node: ast.Expr) -> None:
-        self.value(node.value)
+    def _local(self, name: str, value: Any) -> Vector:
+        """An array of this function, whose entries have the type of the first value."""
+        found = self.arrays[name]
+        if isinstance(found, int):
+            size, kind = WHOLE(found), self.number(value).type
+            found = self.arrays[name] = Vector(self.front.alloca(kind, size), size, kind)
+        return found
 
-    def _if(self, node: ast.If) -> None:
-        """A chain of branches, without recursion: functions have one branch per mode or transition."""
-        builder, before = self.builder, dict(self.variables)
-        end = builder.append_basic_block("end")
-        rest: list[ast.stmt] = [node]
-        while len(rest) == 1 and isinstance(each := rest[0], ast.If):
-            then, otherwise = builder.append_basic_block("then"), builder.append_basic_block("else")
-            builder.cbranch(self.truth(each.test), then, otherwise)
-            builder.position_at_end(then)
-            self.block(each.body)
-            builder.branch(end)
-            builder.position_at_end(otherwise)
-            # A variable first assigned in a branch is unknown after it: the other branches have not set it.
-            self.variables, rest = dict(before), each.orelse
-        self.block(rest)
-        builder.branch(end)
-        builder.position_at_end(end)
-        self.variables = before
+    def _do(self, term: Any) -> None:
+        self.value(term)
 
-    def _for(self, node: ast.For) -> None:
-        assert isinstance(node.iter, ast.Call)
-        bounds = [self.value(argument) for argument in node.iter.args]
-        start, stop, step = (WHOLE(0), *bounds, WHOLE(1)) if len(bounds) == 1 else (*bounds, WHOLE(1))[:3]
-        with loop(self.builder, start, stop, step) as index:
-            self._store(node.target, index)
-            self.block(node.body)
+    def _alone(self, statements: Sequence[Any]) -> None:
+        """A block that may not run: a variable first assigned in it is unknown after it."""
+        before = dict(self.variables), dict(self.values)
+        self.block(statements)
+        self.variables, self.values = before
 
-    STATEMENTS: ClassVar[dict[type[ast.AST], Callable[[_Body, Any], None]]] = {
-        ast.Pass: _pass,
-        ast.Assign: _assign,
-        ast.Expr: _expression,
-        ast.If: _if,
-        ast.For: _for,
+    def _when(self, condition: Any, body: Sequence[Any], other: Sequence[Any]) -> None:
+        with self.builder.if_else(self.truth(condition)) as (then, otherwise):
+            for branch, statements in ((then, body), (otherwise, other)):
+                with branch:
+                    self._alone(statements)
+
+    def _for(self, name: str, start: Any, stop: Any, step: Any, body: Sequence[Any]) -> None:
+        with loop(self.builder, *map(self.value, (start, stop, step))) as index:
+            self._store_variable(name, index)
+            self.block(body)
+
+    def _whole(self, name: str, number: int) -> None:
+        self.values[name] = WHOLE(number)
+
+    def _array(self, name: str, size: int) -> None:
+        self.arrays[name] = size
+
+    STATEMENTS: ClassVar[dict[str, Callable[..., None]]] = {
+        "set": _set,
+        "do": _do,
+        "when": _when,
+        "for": _for,
+        "whole": _whole,
+        "array": _array,
     }
 
-    # Expressions.
+    # Terms.
 
     def number(self, value: Any) -> Any:
         """A value as a float."""
         return self.builder.sitofp(value, NUMBER) if value.type == WHOLE else value
 
-    def _constant(self, node: ast.Constant) -> Any:
-        if type(node.value) is int:
-            return WHOLE(node.value)
-        if type(node.value) is float:
-            return NUMBER(node.value)
-        return self._unknown(node)
+    def truth(self, term: Any) -> Any:
+        """A term as a condition."""
+        value = self.value(term)
+        if value.type != TRUTH:
+            raise LoweringError(f"{term} is no condition")
+        return value
 
-    def _name(self, node: ast.Name) -> Any:
-        if node.id in self.values:
-            return self.values[node.id]
-        if node.id in self.variables:
-            variable = self.variables[node.id]
-            return variable if isinstance(variable, tuple) else self.builder.load(variable)
-        if node.id in ("inf", "nan"):
-            return NUMBER(float(node.id))
-        return self._unknown(node)
+    def _get(self, _: str, name: str) -> Any:
+        if name in self.values:
+            return self.values[name]
+        if name not in self.variables:
+            raise LoweringError(f"{name} has no value yet")
+        variable = self.variables[name]
+        return variable if isinstance(variable, tuple) else self.builder.load(variable)
 
-    def _tuple(self, node: ast.Tuple) -> tuple[Any, ...]:
-        return tuple(self.value(each) for each in node.elts)
-
-    def _place(self, node: ast.Subscript) -> Any:
+    def _place(self, array: Any, indices: Sequence[Any]) -> Any:
         """The address of an entry."""
-        array, index = self.value(node.value), self.value(node.slice)
+        places = [self.value(each) for each in indices]
         if isinstance(array, Matrix):
-            return array.address(*index)
-        return self.builder.gep(array.data, [index], source_etype=NUMBER)
+            return array.address(*places)
+        return self.builder.gep(array.data, places, source_etype=array.kind)
 
-    def _subscript(self, node: ast.Subscript) -> Any:
-        value = self.value(node.value)
-        if isinstance(value, tuple):
-            return value[ast.literal_eval(node.slice)]
-        return self.builder.load(self._place(node), typ=NUMBER)
+    def _at(self, _: str, name: str, *indices: Any) -> Any:
+        array: Any = self.arrays[name] if name in self.arrays else self.values[name]
+        kind = NUMBER if isinstance(array, Matrix) else array.kind
+        return self.builder.load(self._place(array, indices), typ=kind)
 
-    def _negative(self, node: ast.UnaryOp) -> Any:
-        if not isinstance(node.op, ast.USub):
-            return self._unknown(node)
-        value = self.value(node.operand)
+    def _listed(self, _: str, numbers: Sequence[Any], index: Any) -> Any:
+        kind = WHOLE if all(type(each) is int for each in numbers) else NUMBER
+        entries = ir.ArrayType(kind, len(numbers))
+        module = self.builder.module
+        place = ir.GlobalVariable(module, entries, module.get_unique_name("listed"))
+        place.linkage, place.global_constant = "internal", True
+        place.initializer = entries([kind(each) for each in numbers])
+        address = self.builder.bitcast(place, kind.as_pointer())
+        return self.builder.load(self.builder.gep(address, [self.value(index)], source_etype=kind), typ=kind)
+
+    def _item(self, _: str, term: Any, place: int) -> Any:
+        return self.value(term)[place]
+
+    def _several(self, _: str, *terms: Any) -> tuple[Any, ...]:
+        return tuple(map(self.value, terms))
+
+    def _negative(self, _: str, term: Any) -> Any:
+        value = self.value(term)
         if value.type == WHOLE:
             return self.builder.neg(value)
         if value.type == LANES:
@@ -298,100 +319,101 @@ class _Body:
             return self.builder.fmul(everywhere(self.builder, NUMBER(-1.0), NARROW), value, flags=self.flags)
         return self.builder.fneg(value, flags=self.flags)
 
-    def _operation(self, node: ast.BinOp) -> Any:
-        a, b = self.value(node.left), self.value(node.right)
-        kind = type(node.op)
-        if kind in self.WHOLE_OPERATIONS and a.type == b.type == WHOLE:
-            return self.WHOLE_OPERATIONS[kind](self.builder, a, b)
-        if kind not in self.OPERATIONS:
-            return self._unknown(node)
+    def _arithmetic(self, operation: str, left: Any, right: Any) -> Any:
+        a, b = self.value(left), self.value(right)
+        if a.type == b.type == WHOLE and operation in self.WHOLE_OPERATIONS:
+            return self.WHOLE_OPERATIONS[operation](self.builder, a, b)
         a, b = self.number(a), self.number(b)
         if LANES in (a.type, b.type):
             a, b = (each if each.type == LANES else everywhere(self.builder, each, NARROW) for each in (a, b))
-        return self.OPERATIONS[kind](self.builder, a, b, flags=self.flags)
+        return self.OPERATIONS[operation](self.builder, a, b, flags=self.flags)
 
-    OPERATIONS: ClassVar[dict[type[ast.AST], Callable[..., Any]]] = {
-        ast.Add: Builder.fadd,
-        ast.Sub: Builder.fsub,
-        ast.Mult: Builder.fmul,
-        ast.Div: Builder.fdiv,
-        ast.Mod: lambda builder, a, b, flags: CALLS["remainder"](builder, a, b),
-        ast.Pow: lambda builder, a, b, flags: CALLS["pow"](builder, a, b),
+    OPERATIONS: ClassVar[dict[str, Callable[..., Any]]] = {
+        "+": Builder.fadd,
+        "-": Builder.fsub,
+        "*": Builder.fmul,
+        "/": Builder.fdiv,
+        "%": lambda builder, a, b, flags: CALLS["remainder"](builder, a, b),
+        "**": lambda builder, a, b, flags: CALLS["pow"](builder, a, b),
     }
     # Integers are counts here. They are not negative in a division, so ``sdiv`` equals ``//``.
-    WHOLE_OPERATIONS: ClassVar[dict[type[ast.AST], Callable[..., Any]]] = {
-        ast.Add: Builder.add,
-        ast.Sub: Builder.sub,
-        ast.Mult: Builder.mul,
-        ast.FloorDiv: ir.IRBuilder.sdiv,
+    WHOLE_OPERATIONS: ClassVar[dict[str, Callable[..., Any]]] = {
+        "+": Builder.add,
+        "-": Builder.sub,
+        "*": Builder.mul,
+        "//": ir.IRBuilder.sdiv,
     }
 
-    def truth(self, node: ast.expr) -> Any:
-        """An expression as a condition."""
-        value = self.value(node)
-        if value.type != TRUTH:
-            return self._unknown(node)
-        return value
-
-    def _comparison(self, node: ast.Compare) -> Any:
-        values = [self.value(each) for each in (node.left, *node.comparators)]
-        pairs = zip(node.ops, values, values[1:], strict=False)
-        return reduce(self.builder.and_, [self._compared(type(op), a, b) for op, a, b in pairs])
-
-    def _compared(self, kind: type[ast.cmpop], a: Any, b: Any) -> Any:
-        symbol = COMPARISONS[kind]
+    def _compared(self, symbol: str, left: Any, right: Any) -> Any:
+        a, b = self.value(left), self.value(right)
         if a.type == b.type == WHOLE:
             return self.builder.icmp_signed(symbol, a, b)
         compare = self.builder.fcmp_unordered if symbol == "!=" else self.builder.fcmp_ordered
         return compare(symbol, self.number(a), self.number(b))
 
-    def _connective(self, node: ast.BoolOp) -> Any:
-        join = self.builder.and_ if isinstance(node.op, ast.And) else self.builder.or_
-        return reduce(join, [self.truth(each) for each in node.values])
+    def _both(self, _: str, a: Any, b: Any) -> Any:
+        return self.builder.and_(self.truth(a), self.truth(b))
 
-    def _not(self, node: ast.UnaryOp) -> Any:
-        return self.builder.not_(self.truth(node.operand))
+    def _either(self, _: str, a: Any, b: Any) -> Any:
+        return self.builder.or_(self.truth(a), self.truth(b))
 
-    def _unary(self, node: ast.UnaryOp) -> Any:
-        return self._not(node) if isinstance(node.op, ast.Not) else self._negative(node)
+    def _not(self, _: str, term: Any) -> Any:
+        return self.builder.not_(self.truth(term))
 
-    def _choice(self, node: ast.IfExp) -> Any:
-        condition = self.truth(node.test)
-        if all(_is_at_hand(each) for each in (node.body, node.orelse)):
-            return self.builder.select(
-                condition, *(self.number(self.value(e)) for e in (node.body, node.orelse))
-            )
+    def _if(self, _: str, condition: Any, *branches: Any) -> Any:
+        decided = self.truth(condition)
+        if all(map(_is_at_hand, branches)):
+            return self.builder.select(decided, *(self.number(self.value(each)) for each in branches))
         result = self.front.alloca(NUMBER)
-        with self.builder.if_else(condition) as (then, otherwise):
-            for branch, each in ((then, node.body), (otherwise, node.orelse)):
-                with branch:
+        with self.builder.if_else(decided) as places:
+            for place, each in zip(places, branches, strict=True):
+                with place:
                     self.builder.store(self.number(self.value(each)), result)
         return self.builder.load(result)
 
-    def _call(self, node: ast.Call) -> Any:
-        name = ast.unparse(node.func)
-        if name == "len":
-            [array] = (self.value(each) for each in node.args)
-            return array.length
+    def _length(self, _: str, array: str) -> Any:
+        return self.values[array].length
+
+    TERMS: ClassVar[dict[str, Callable[..., Any]]] = {
+        "get": _get,
+        "at": _at,
+        "listed": _listed,
+        "item": _item,
+        "several": _several,
+        "if": _if,
+        "neg": _negative,
+        **dict.fromkeys(("+", "-", "*", "/", "//", "**", "%"), _arithmetic),
+        **dict.fromkeys(("<", "<=", ">", ">=", "==", "!="), _compared),
+        "and": _both,
+        "or": _either,
+        "not": _not,
+        "length": _length,
+    }
+
+    # Calls.
+
+    def _call(self, name: str, terms: Sequence[Any]) -> Any:
         known = self.calls.get(name)
         if isinstance(known, CaseTable):
             table = self.builder.inttoptr(WHOLE(known.address), ADDRESS)
             place = self.builder.gep(table, [self.arguments["index"]], source_etype=WHOLE)
-            address = self.builder.load(place, typ=WHOLE)
-            return self._called(address, [*self.arguments.values()])
+            return self._called(self.builder.load(place, typ=WHOLE), [*self.arguments.values()])
         if known is not None:
-            return self._own_call(known, node.args)
-        call: Call | None = CALLS.get(name)
-        if call is None:
-            return self._unknown(node)
-        arguments = [self._argument(call, i, each) for i, each in enumerate(node.args)]
+            return self._own_call(known, terms)
+        if name not in CALLS:
+            raise LoweringError(f"compiled functions do not have {name}")
+        call = CALLS[name]
+        arguments = []
+        for place, term in enumerate(terms):
+            value = term if place in call.known else self.value(term)
+            if isinstance(value, tuple):
+                value = [self.number(each) for each in value]
+            arguments.append(self.number(value) if call.on_numbers else value)
         return call(self.builder, *arguments)
 
-    def _own_call(self, function: OwnFunction, nodes: Sequence[ast.expr]) -> tuple[Any, ...]:
+    def _own_call(self, function: OwnFunction, terms: Sequence[Any]) -> tuple[Any, ...]:
         """The numbers that a function of the user writes; array arguments are passed on unchanged."""
-        names = [node.id if isinstance(node, ast.Name) else "" for node in nodes]
-        pairs = zip(names, nodes, strict=True)
-        arguments = [self.arguments[name] if name in self.arguments else self.value(n) for name, n in pairs]
+        arguments = [self.value(term) if type(term) is int else self.arguments[term[1]] for term in terms]
         numbers = self.front.alloca(NUMBER, WHOLE(function.size))
         row = ARRAYS[1](ir.Undefined)
         size, width = WHOLE(function.size), WHOLE(8)
@@ -410,37 +432,7 @@ class _Body:
         kind = ir.FunctionType(ir.VoidType(), [each.type for each in arguments])
         self.builder.call(self.builder.inttoptr(address, kind.as_pointer()), arguments)
 
-    def _argument(self, call: Call, place: int, node: ast.expr) -> Any:
-        if place in call.known:
-            return ast.literal_eval(node)
-        value = self.value(node)
-        if isinstance(value, tuple):
-            return [self.number(each) for each in value]
-        return self.number(value) if call.on_numbers else value
 
-    EXPRESSIONS: ClassVar[dict[type[ast.AST], Callable[[_Body, Any], Any]]] = {
-        ast.Constant: _constant,
-        ast.Name: _name,
-        ast.Tuple: _tuple,
-        ast.Subscript: _subscript,
-        ast.UnaryOp: _unary,
-        ast.BinOp: _operation,
-        ast.Compare: _comparison,
-        ast.BoolOp: _connective,
-        ast.IfExp: _choice,
-        ast.Call: _call,
-    }
-
-
-def _is_at_hand(node: ast.expr) -> bool:
+def _is_at_hand(term: Any) -> bool:
     """Whether a value costs so little that it may be computed even if it is not used."""
-    if isinstance(node, ast.UnaryOp):
-        return _is_at_hand(node.operand)
-    return isinstance(node, ast.Name | ast.Constant)
-
-
-def parsed(source: str) -> dict[str, ast.FunctionDef]:
-    """The functions of a text, by name."""
-    with PARSER:
-        nodes: Sequence[ast.stmt] = ast.parse(source).body
-    return {node.name: node for node in nodes if isinstance(node, ast.FunctionDef)}
+    return type(term) in (int, float) or term[0] == "get"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,7 +9,7 @@ from llvmlite import binding, ir
 
 from hybrid.compiler.interrupts import between_passes
 from hybrid.compiler.llvm.engine import HASTE, SPEED, target
-from hybrid.compiler.llvm.lowering import NO_CALLS, CaseTable, OwnFunction, Signature, lower
+from hybrid.compiler.llvm.lowering import NO_CALLS, CaseTable, Function, OwnFunction, lower
 
 # Functions with more instructions than this, as written, are emitted in haste: LLVM's time grows faster than
 # their length, and they run no slower.
@@ -35,19 +34,17 @@ def _optimise(module: Any) -> None:
 
 @between_passes()
 def machine_code(
-    functions: Sequence[tuple[ast.FunctionDef, Signature, bool]],
-    calls: Mapping[str, OwnFunction | CaseTable] = NO_CALLS,
+    functions: Sequence[Function], calls: Mapping[str, OwnFunction | CaseTable] = NO_CALLS
 ) -> bytes:
     """The contents of an object file with these functions.
 
-    The truth value of each function says whether its multiplications and additions may be fused; ``calls``
-    are what they call of the user's functions and of tables of cases.
+    ``calls`` are what they call of the user's functions and of tables of cases.
     """
     module = ir.Module("model")
     module.triple = binding.get_default_triple()
     module.data_layout = str(target().target_data)
-    for written, signature, fused in functions:
-        lower(module, written, signature, fused=fused, calls=calls)
+    for written in functions:
+        lower(module, written, calls)
     parsed = binding.parse_assembly(str(module))
     parsed.verify()
     _optimise(parsed)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from hybrid.compiler.emitted import Propagator, Series
 from hybrid.compiler.propagators.equations import Equations
 from hybrid.compiler.propagators.writing import OTHERS, groups, harmonics_of, names_of_state, write_series
+from hybrid.compiler.statements.code import get
+from hybrid.compiler.statements.values import Constants, assignments
 from hybrid.compiler.taylor.linear import LinearForm, linear_form, table_statements
 from hybrid.compiler.taylor.loops import padded
-from hybrid.expression.code import assignments
-from hybrid.expression.constants import Constants
 from hybrid.expression.nodes import Expression, Symbol
 from hybrid.expression.tracing import Symbols
 from hybrid.kernels.types.codes import EXACT, WIDE
@@ -31,8 +31,8 @@ def _write_linear(
     form: LinearForm, harmonics: dict[Expression, Symbol], guards: int, symbols: Symbols
 ) -> Series:
     n, constants = len(symbols.x), Constants()
-    begun = [f"start{i}" for i in range(len(harmonics))]
-    starts = [*names_of_state(symbols)[1], *begun, "1.0"]
+    begun = [get(f"start{i}") for i in range(len(harmonics))]
+    starts = [*names_of_state(symbols)[1], *begun, 1.0]
     lines, vectors, table, tangents = table_statements(form, n, constants, starts)
     shared = [*constants.statements(), *assignments(begun, list(harmonics)), *lines]
     front = padded(n + guards + OTHERS, WIDE)

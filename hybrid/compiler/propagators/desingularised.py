@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 from hybrid.compiler.emitted import Propagator, Series
 from hybrid.compiler.propagators.equations import Boundary, Equations, in_terms_of_root
-from hybrid.compiler.propagators.writing import CLOCK, Body, harmonics_of, names_of_state, seeds_of
+from hybrid.compiler.propagators.writing import CLOCK, Body, harmonics_of, names_of_state, power_of, seeds_of
+from hybrid.compiler.statements.code import get
+from hybrid.compiler.statements.values import assignments
 from hybrid.compiler.taylor.roots import ROOT, in_roots, is_crossed, on_clock, slope_along
 from hybrid.compiler.taylor.series import NoSeries
-from hybrid.expression.code import assignments
 from hybrid.expression.derivatives import derivative, directional, divergence
 from hybrid.expression.graph import all_replaced, replaced
 from hybrid.expression.nodes import Expression
@@ -53,7 +54,9 @@ def _write_desingularised(
     harmonics = harmonics_of(field, symbols)
     field = all_replaced(field, harmonics)
     # The time since the start is advanced too, in the column after the states.
-    body = Body(symbols, guards, [ROOT, *harmonics.values()], f"{{}}y{len(symbols.x)}")
+    body = Body(
+        symbols, guards, [ROOT, *harmonics.values()], lambda prefix: get(f"{prefix}y{len(symbols.x)}")
+    )
     clock, (root, *driven) = body.column(CLOCK), body.rows.values()
     seeds = seeds_of(symbols)
     slope = replaced(slope_along(field, z, symbols), harmonics)
@@ -61,21 +64,21 @@ def _write_desingularised(
     roots = in_terms_of_root(boundaries, z, ROOT, symbols)
     crossing = [roots.get(place, in_roots(guard, z, order)) for place, guard in enumerate(guards)]
     columns, starts = names_of_state(symbols)
-    body.start_root("root", z, order, min(roots), goes_on=True)
+    body.start_root(get("root"), z, order, min(roots), goes_on=True)
     # A guard that moves with the forcing has the harmonics in its powers in the field, too.
     z = replaced(z, harmonics)
-    body.at_start[z] = "*".join(["root"] * order)
+    body.at_start[z] = power_of(get("root"), order)
     rates = [on_clock(rate, z, order) for rate in field]
     tangents = [on_clock(along, z, order) for along in directional(field, seeds)]
     trace = on_clock(divergence(field, symbols.x), z, order)
     pace = ROOT ** (order - 1)
     turning = [pace * replaced(derivative(function, symbols.t), harmonics) for function in harmonics]
-    begun = [f"start{i}" for i in range(len(harmonics))]
+    begun = [get(f"start{i}") for i in range(len(harmonics))]
     body.preamble += assignments(begun, list(harmonics))
     return body.assemble(
         [*symbols.x, None, ROOT, *harmonics.values()],
         [*columns, clock, root, *driven],
-        [*starts, "0.0", "root", *begun],
+        [*starts, 0.0, get("root"), *begun],
         [*rates, pace, in_roots(slope / order, z, order), *turning],
         crossing,
         trace,

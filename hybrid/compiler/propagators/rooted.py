@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from hybrid.compiler.emitted import Propagator, Series
 from hybrid.compiler.propagators.equations import Boundary, Equations, in_terms_of_root
 from hybrid.compiler.propagators.writing import Body, names_of_state, seeds_of
+from hybrid.compiler.statements.code import get
 from hybrid.compiler.taylor.roots import Root, in_roots, regular_root
 from hybrid.compiler.taylor.series import ONE_THEN_ZERO
 from hybrid.expression.derivatives import directional, divergence
@@ -41,7 +42,7 @@ def _write_rooted(
     symbols: Symbols,
 ) -> Series:
     """Series in time of the states and of the roots; powers of the roots replace fractional powers."""
-    body = Body(symbols, guards, [root.symbol for root in roots], ONE_THEN_ZERO)
+    body = Body(symbols, guards, [root.symbol for root in roots], lambda _: ONE_THEN_ZERO)
     seeds = seeds_of(symbols)
 
     def in_all_roots(expression: Expression) -> Expression:
@@ -50,7 +51,7 @@ def _write_rooted(
         return expression
 
     signed: dict[int, Expression] = {}
-    names = [f"root_{root.symbol.label}" for root in roots]
+    names = [get(f"root_{root.symbol.label}") for root in roots]
     for name, root in zip(names, roots, strict=True):
         places = in_terms_of_root(boundaries, root.base, root.symbol, symbols)
         body.start_root(name, root.base, root.order, min(places), goes_on=False)

@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import reduce
+from operator import mul
+from typing import Any
 
 from hybrid.compiler.emitted import Series
 from hybrid.compiler.propagators.equations import ELEMENTARY
-from hybrid.compiler.taylor.loops import StateLoop, TangentLoop, indented, padded
+from hybrid.compiler.statements.code import (
+    Code,
+    Statement,
+    at,
+    call,
+    either,
+    equal,
+    get,
+    less,
+    loop,
+    put,
+    whole,
+)
+from hybrid.compiler.statements.values import Constants, assignments
+from hybrid.compiler.taylor.loops import GROUPS, ORDER, StateLoop, TangentLoop, padded
 from hybrid.compiler.taylor.pairs import columns_of
-from hybrid.compiler.taylor.series import ONE_THEN_ZERO, PAIRS, Recurrences
-from hybrid.expression.code import assignments
-from hybrid.expression.constants import Constants
+from hybrid.compiler.taylor.series import ONE_THEN_ZERO, PAIRS, Recurrences, o
 from hybrid.expression.derivatives import derivative, directional, divergence
 from hybrid.expression.graph import mentions, nodes_of
 from hybrid.expression.nodes import ZERO, Expression, Symbol, add, order_of
@@ -29,7 +44,7 @@ SAME_ROOT = 1e-13
 
 def write_series(field: Sequence[Expression], guards: Sequence[Expression], symbols: Symbols) -> Series:
     """The series of a field in time, without and with tangent vectors."""
-    body = Body(symbols, guards, (), ONE_THEN_ZERO)
+    body = Body(symbols, guards, (), lambda _: ONE_THEN_ZERO)
     seeds = seeds_of(symbols)
     tangents = directional(field, seeds)
     trace = divergence(field, symbols.x)
@@ -56,10 +71,10 @@ def seeds_of(symbols: Symbols) -> dict[Symbol, Symbol]:
     return {x: Symbol(f"v{i}") for i, x in enumerate(symbols.x)}
 
 
-def names_of_state(symbols: Symbols) -> tuple[list[str], list[str]]:
-    """Columns of the state, and the initial values of its components, as text."""
+def names_of_state(symbols: Symbols) -> tuple[list[int], list[Any]]:
+    """Columns of the state, and the initial values of its components."""
     n = len(symbols.x)
-    return [str(i) for i in range(n)], [f"x[{i}]" for i in range(n)]
+    return [*range(n)], [at("x", i) for i in range(n)]
 
 
 class Body:
@@ -70,11 +85,15 @@ class Body:
     others
         Symbols besides the states, each of which has a column.
     time
-        Text of the coefficients of time from the first on; the prefix of the local variables goes into it.
+        The coefficients of time from the first on, as a function of the prefix of the local variables.
     """
 
     def __init__(
-        self, symbols: Symbols, guards: Sequence[Expression], others: Iterable[Symbol], time: str
+        self,
+        symbols: Symbols,
+        guards: Sequence[Expression],
+        others: Iterable[Symbol],
+        time: Callable[[str], Code],
     ) -> None:
         self.symbols, self.time = symbols, time
         self.n = len(symbols.x)
@@ -82,47 +101,53 @@ class Body:
         self.columns = padded(self.behind_guards + OTHERS, WIDE)
         self.rows = {symbol: self.allot() for symbol in others}
         self.constants = Constants()
-        self.preamble: list[str] = []
-        self.at_start: dict[Expression, str] = {}
+        self.preamble: list[Statement] = []
+        self.at_start: dict[Expression, Any] = {}
 
-    def column(self, place: int) -> str:
+    def column(self, place: int) -> int:
         """A column after those of the guards."""
-        return str(self.behind_guards + place)
+        return self.behind_guards + place
 
-    def start_root(self, name: str, z: Expression, order: int, place: int, *, goes_on: bool) -> None:
-        """Statements for ``name``, the initial value of the root of ``z``, which is the guard in a place.
+    def start_root(self, root: Code, z: Expression, order: int, place: int, *, goes_on: bool) -> None:
+        """Statements for the initial value of the ``root`` of ``z``, which is the guard in a place.
 
         With a speed of zero too, a root of zero would stay there. So a root that is small starts below the
         rounding of ``z``. It starts at zero only where the kernel knows that the guard is zero and moves on.
         A root that ``goes_on`` starts with its value at the end of the last step. Its error is as small as
         that of the speed of ``z``; near zero, the error of ``z`` itself would make a far larger one.
         """
-        size = add(*(Absolute(derivative(z, x)) * Absolute(x) for x in self.symbols.x))
-        power = "*".join(["last"] * order)
-        self.at_start[z] = "*".join([name] * order)
-        least = f"max(z, {FLOOR}*size, 1e-300)"
+        sizes = add(*(Absolute(derivative(z, x)) * Absolute(x) for x in self.symbols.x))
+        self.at_start[z] = power_of(root, order)
+        guard, size, last, origin, apart, least, same = map(
+            get, ("z", "size", "last", "origin", "apart", "least", "same")
+        )
+        close = SAME_ROOT * size
+        # A stored value this close to the root is taken as the root, whichever step stored it.
+        is_same = call("and", call("<=", apart, close), less(close, guard))
+        if goes_on:
+            is_same = call("or", is_same, equal(origin, float(FROM_LAST_STEP)))
+        extracted = call("sqrt", least) if order == 2 else least ** (1 / order)
         self.preamble += [
-            *assignments(["z", "size"], [z, size]),
-            f"last = abs(out[order + 1, {self.n + place}])",
-            f"origin = out[order + 2, {self.n + place}]",
-            f"apart = abs({power} - z)",
-            # A stored value this close to the root is taken as the root, whichever step stored it.
-            f"same = apart <= {SAME_ROOT}*size < z",
-            *([f"same = same or origin == {FROM_LAST_STEP}.0"] if goes_on else []),
-            f"{name} = last if same else {f'sqrt({least})' if order == 2 else f'{least}**{1 / order!r}'}",
-            f"{name} = 0.0 if origin == {FROM_ZERO}.0 else {name}",
+            *assignments([guard, size], [z, sizes]),
+            put(last, call("abs", at("out", ORDER + 1, self.n + place))),
+            put(origin, at("out", ORDER + 2, self.n + place)),
+            put(apart, call("abs", power_of(last, order) - guard)),
+            put(same, is_same),
+            put(least, call("max", guard, FLOOR * size, 1e-300)),
+            put(root, either(same, last, extracted)),
+            put(root, either(equal(origin, float(FROM_ZERO)), 0.0, root)),
         ]
 
-    def allot(self) -> str:
+    def allot(self) -> int:
         """A new column."""
         self.columns += 1
-        return str(self.columns - 1)
+        return self.columns - 1
 
     def assemble(
         self,
         names: Sequence[Symbol | None],
-        columns: list[str],
-        starts: list[str],
+        columns: list[int],
+        starts: list[Any],
         rates: Sequence[Expression],
         guards: Sequence[Expression],
         trace: Expression,
@@ -136,23 +161,30 @@ class Body:
         """
         free = self.columns
         alone = self._state("s", names, columns, starts, rates, guards)
-        self._place_pairs(alone)
+        places = self._place_pairs(alone)
         width, self.columns = self.columns, free
         names, rates = [*names, None], [*rates, trace]
-        columns, starts = [*columns, self.column(DIVERGENCE)], [*starts, "0.0"]
+        columns, starts = [*columns, self.column(DIVERGENCE)], [*starts, 0.0]
         moved = self._state("a", names, columns, starts, rates, guards)
         vectors = Recurrences(
-            dict.fromkeys(seeds.values(), ""), None, self.allot, "b", self.constants, moved.block, lanes=True
+            dict.fromkeys(seeds.values(), 0), None, self.allot, "b", self.constants, moved.block, lanes=True
         )
         vectors.expect(seeds.values(), tangents)
         carried = TangentLoop(list(seeds.values()), vectors)
         carried.compute(tangents)
-        self._place_pairs(moved)
+        placed = self._place_pairs(moved) | carried.places()
         together = [*moved.higher(), *carried.higher()]
-        shared = [*self.preamble, *self.constants.statements(), "o = 0"]
+        shared = [*self.preamble, *self.constants.statements(), put(o, 0)]
         return Series(
-            (*shared, *alone.first(), *_each_order(alone.higher())),
-            (groups(self.n), *shared, *moved.first(), *carried.first(), *_each_order(together)),
+            (*_named(places), *shared, *alone.first(), _each_order(alone.higher())),
+            (
+                *_named(placed),
+                groups(self.n),
+                *shared,
+                *moved.first(),
+                *carried.first(),
+                _each_order(together),
+            ),
             padded(max(width, self.columns), WIDE),
             0,
             carried.columns,
@@ -162,40 +194,51 @@ class Body:
         self,
         prefix: str,
         names: Sequence[Symbol | None],
-        columns: list[str],
-        starts: list[str],
+        columns: list[int],
+        starts: list[Any],
         rates: Sequence[Expression],
         guards: Sequence[Expression],
     ) -> StateLoop:
         """The loop of the state and of all other quantities in ``rates``; local names have a prefix."""
-        state = {x: str(i) for i, x in enumerate(self.symbols.x)}
-        time = self.symbols.t, self.time.format(prefix)
+        state = {x: i for i, x in enumerate(self.symbols.x)}
+        time = self.symbols.t, self.time(prefix)
         block = Recurrences(
             {**state, **self.rows}, time, self.allot, prefix, self.constants, at_start=self.at_start
         )
         block.expect(names, rates)
         moved = StateLoop(names, columns, rates, starts, block)
-        crossing = {str(self.n + place): block.coefficient(guard) for place, guard in enumerate(guards)}
+        crossing = {self.n + place: block.coefficient(guard) for place, guard in enumerate(guards)}
         moved.write_front(self.behind_guards + OTHERS, crossing)
         return moved
 
-    def _place_pairs(self, loop: StateLoop) -> None:
-        block, found = loop.block, loop.layers()
+    def _place_pairs(self, loop: StateLoop) -> dict[str, int]:
+        """Columns for the factors of convolutions; returns those of each block, and of each second factor."""
+        block, found, places = loop.block, loop.layers(), dict[str, int]()
         for name, count in columns_of(found).items():
             if block.common_left is not None and name == found[0].left:
                 continue
             self.columns = padded(self.columns, WIDE)
-            self.preamble.append(f"{name} = {self.columns}")
+            places[name] = self.columns
             self.columns += padded(count)
         for layer in found:
             for column, place in enumerate(layer.places):
-                self.preamble.append(f"{block.prefix}c{place} = {layer.right} + {column}")
+                places[f"{block.prefix}c{place}"] = places[layer.right] + column
+        return places
 
 
-def groups(n: int) -> str:
+def power_of(root: Code, order: int) -> Any:
+    """A whole power as a product."""
+    return reduce(mul, [root] * order)
+
+
+def groups(n: int) -> Statement:
     """The statement that computes the number of groups of tangent vectors."""
-    return f"groups = (len(x)//{n} + {NARROW - 2})//{NARROW}"
+    return put(GROUPS, (call("length", "x") // n + (NARROW - 2)) // NARROW)
 
 
-def _each_order(statements: Iterable[str]) -> list[str]:
-    return ["for o in range(1, order + 1):", *indented(["shrink = 1.0/o", *statements])]
+def _named(places: Mapping[str, int]) -> list[Statement]:
+    return [whole(name, place) for name, place in places.items()]
+
+
+def _each_order(statements: Sequence[Statement]) -> Statement:
+    return loop("o", 1, ORDER + 1, [put(get("shrink"), 1.0 / o), *statements])

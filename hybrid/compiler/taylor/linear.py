@@ -9,11 +9,27 @@ accurate to its own rounding. After that, no order depends on the one before it.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import attrs
 
-from hybrid.compiler.taylor.loops import indented, padded
-from hybrid.expression.constants import Constants
+from hybrid.compiler.statements.code import (
+    Code,
+    Statement,
+    at,
+    call,
+    do,
+    either,
+    equal,
+    get,
+    loop,
+    put,
+    several,
+    when,
+)
+from hybrid.compiler.statements.values import Constants
+from hybrid.compiler.taylor.loops import GROUPS, ORDER, TABLE, VECTORS, padded
+from hybrid.compiler.taylor.series import OUT, o
 from hybrid.expression.derivatives import partial_derivatives
 from hybrid.expression.graph import degree_of, mentions, replaced
 from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol, add
@@ -80,53 +96,55 @@ def _row(entry: Expression, variables: Sequence[Symbol], time: Symbol) -> list[E
 
 
 def table_statements(
-    form: LinearForm, n: int, constants: Constants, starts: Sequence[str]
-) -> tuple[list[str], list[str], int, int]:
+    form: LinearForm, n: int, constants: Constants, starts: Sequence[Any]
+) -> tuple[list[Statement], list[Statement], int, int]:
     """Statements for the series and for tangent vectors, and numbers of columns.
 
     The two numbers are the columns of the table and of four tangent vectors. In the statements, ``table`` and
-    ``vectors`` are the first columns of the two. ``starts`` are the texts of ``y`` at the start of a step.
+    ``vectors`` are the first columns of the two. ``starts`` is ``y`` at the start of a step.
     """
     size, guards = len(form.starts), len(form.guards)
     front, one = padded(n + guards + 2), size - 1
-    begin = ["nothing = four_times(0.0)"]
+    zs, ls, ms = ([get(f"{name}{i}") for i in range(size)] for name in "zlm")
+    nothing, held, flag = get("nothing"), get("held"), at("out", ORDER + 2, TABLE)
+    begin = [put(nothing, call("four_times", 0.0))]
     for i in range(size):
-        unit = ", ".join(f"1.0 if c + {lane} == {i} else 0.0" for lane in range(NARROW))
-        begin.append(f"store_row(out, order + 2, table, ({unit},))")
-        begin.append(f"z{i}, l{i} = load(out, order + 2, table), nothing")
-    write = [_entry(f"z{i}", i, front) for i in range(n)]
+        unit = several([either(equal(get("c") + lane, i), 1.0, 0.0) for lane in range(NARROW)])
+        begin.append(do("store_row", OUT, ORDER + 2, TABLE, unit))
+        begin += [put(zs[i], call("load", OUT, ORDER + 2, TABLE)), put(ls[i], nothing)]
+    write = [_entry(zs[i], i, front) for i in range(n)]
     for i, row in enumerate(form.guards):
-        write += [f"held, _ = {_product(row, '1.0', constants)}", _entry("held", n + i, front)]
-    write += [_entry("nothing", i, front) for i in range(n + guards, front)]
-    step = [f"r{i}, m{i} = {_product(form.rates[i], 'o + 1.0', constants)}" for i in range(one)]
-    step += [f"z{i}, l{i} = r{i}, m{i}" for i in range(one)]
-    step.append(f"z{one}, l{one} = nothing, nothing")
-    lines = [
+        write += [put(several([held, get("_")]), _product(row, 1.0, constants)), _entry(held, n + i, front)]
+    write += [_entry(nothing, i, front) for i in range(n + guards, front)]
+    rs = [get(f"r{i}") for i in range(one)]
+    step = [put(several([rs[i], ms[i]]), _product(form.rates[i], o + 1.0, constants)) for i in range(one)]
+    for i in range(one):
+        step += [put(zs[i], rs[i]), put(ls[i], ms[i])]
+    step += [put(zs[one], nothing), put(ls[one], nothing)]
+    columns = [*begin, loop("o", 0, ORDER + 1, [*write, *step])]
+    trace = put(at("out", 1, TABLE + (one * front + n + guards + 1)), constants.name(form.trace(n)))
+    statements = [
         # The table depends only on parameters, which do not change during a run.
-        "if out[order + 2, table] != 1.0:",
-        f"    for c in range(0, {size}, {NARROW}):",
-        *indented(indented([*begin, "for o in range(order + 1):", *indented([*write, *step])])),
-        f"    out[1, table + {one * front + n + guards + 1}] = {constants.name(form.trace(n))}",
-        "    out[order + 2, table] = 1.0",
-        f"combine(out, order, table, {front}, ({', '.join(starts)},))",
+        when(call("!=", flag, 1.0), [loop("c", 0, size, columns, step=NARROW), trace, put(flag, 1.0)]),
+        do("combine", OUT, ORDER, TABLE, front, several(starts)),
     ]
+    here = VECTORS + get("g") * (NARROW * n)
     vectors = [
-        f"spread_tangents(x, {n}, out, vectors, {NARROW * n})",
-        "for g in range(groups):",
-        f"    combine_tangents(out, order, table, {front}, vectors + g*{NARROW * n}, {n})",
+        do("spread_tangents", get("x"), n, OUT, VECTORS, NARROW * n),
+        loop("g", 0, GROUPS, [do("combine_tangents", OUT, ORDER, TABLE, front, here, n)]),
     ]
-    return lines, vectors, padded(size) * front, NARROW * n
+    return statements, vectors, padded(size) * front, NARROW * n
 
 
-def _entry(value: str, place: int, front: int) -> str:
-    return f"store_down(out, o, table + c*{front} + {place}, {front}, {value})"
+def _entry(value: Code, place: int, front: int) -> Statement:
+    return do("store_down", OUT, o, TABLE + get("c") * front + place, front, value)
 
 
-def _product(row: Sequence[Expression], by: str, constants: Constants) -> str:
-    """Text of the product of a row with ``z``, divided by ``by``, as a sum of two floats."""
-    places = [i for i, each in enumerate(row) if each != 0]
+def _product(row: Sequence[Expression], by: Any, constants: Constants) -> Code:
+    """The product of a row with ``z``, divided by ``by``, as a sum of two floats."""
+    places = [i for i, entry in enumerate(row) if entry != 0]
     if not places:
-        return "nothing, nothing"
-    factors = "".join(f"{constants.name(row[i])}, " for i in places)
-    highs, lows = ("".join(f"{name}{i}, " for i in places) for name in "zl")
-    return f"divided_dot_product(({factors}), ({highs}), ({lows}), {by})"
+        return several([get("nothing"), get("nothing")])
+    factors = several([constants.name(row[i]) for i in places])
+    highs, lows = (several([get(f"{name}{i}") for i in places]) for name in "zl")
+    return call("divided_dot_product", factors, highs, lows, by)

@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
+from hybrid.compiler.statements.code import (
+    Code,
+    Statement,
+    at,
+    call,
+    do,
+    either,
+    get,
+    less,
+    loop,
+    put,
+    several,
+    when,
+)
 from hybrid.compiler.taylor.pairs import Layer, layers
-from hybrid.compiler.taylor.series import Recurrences
+from hybrid.compiler.taylor.series import OUT, Recurrences, o
 from hybrid.expression.nodes import Expression, Symbol
 from hybrid.kernels.types.codes import NARROW, WIDE
 
-
-def indented(statements: Iterable[str]) -> list[str]:
-    """Indent statements by one level."""
-    return [f"    {statement}" for statement in statements]
+ORDER, TABLE, VECTORS, GROUPS = map(get, ("order", "table", "vectors", "groups"))
 
 
-def below_highest(statements: Iterable[str]) -> list[str]:
+def below_highest(statements: Sequence[Statement]) -> list[Statement]:
     """Statements for an order that has a next one."""
-    found = indented(statements)
-    return ["if o < order:", *found] if found else []
+    return [when(less(o, ORDER), statements)] if statements else []
 
 
 def padded(width: int, whole: int = NARROW) -> int:
@@ -40,23 +51,22 @@ class StateLoop:
     def __init__(
         self,
         symbols: Sequence[Symbol | None],
-        targets: Sequence[str],
+        targets: Sequence[int],
         rates: Sequence[Expression],
-        starts: Sequence[str],
+        starts: Sequence[Any],
         block: Recurrences,
     ) -> None:
         self.block, self.starts = block, starts
-        self.front: list[str] = []
-        self.names = {target: f"{block.prefix}y{i}" for i, target in enumerate(targets)}
+        self.front: list[Any] = []
+        self.names = {target: get(f"{block.prefix}y{i}") for i, target in enumerate(targets)}
         names = self.names.values()
         block.variables |= {symbol: name for symbol, name in zip(symbols, names, strict=True) if symbol}
-        values = [block.coefficient(rate) for rate in rates]
-        self.rates = [f"{block.prefix}r{i} = {value}" for i, value in enumerate(values)]
+        self.values = [block.coefficient(rate) for rate in rates]
 
-    def write_front(self, width: int, others: dict[str, str]) -> None:
-        """Write the first ``width`` columns as one vector: those of ``y``, and the texts of ``others``."""
+    def write_front(self, width: int, others: dict[int, Any]) -> None:
+        """Write the first ``width`` columns as one vector: those of ``y``, and ``others`` by column."""
         columns = self.names | others
-        self.front = [columns.get(str(i), "0.0") for i in range(width)]
+        self.front = [columns.get(i, 0.0) for i in range(width)]
 
     def layers(self) -> list[Layer]:
         """How the factors of the convolutions lie side by side."""
@@ -64,79 +74,93 @@ class StateLoop:
         squares = [block.rows.get(right) == left for left, right in block.pairs]
         return layers([left for left, _ in block.pairs], squares, block.prefix)
 
-    def first(self) -> list[str]:
+    def first(self) -> list[Statement]:
         """Statements for order zero."""
         block = self.block
-        begin = [f"{name} = {start}" for name, start in zip(self.names.values(), self.starts, strict=True)]
-        last = [f"{name} = 0.0" for name in self._last()]
-        return [*begin, *self._separate(), *block.first, *self._rows(), *self.rates, *self._sums("1"), *last]
+        begin = [put(name, start) for name, start in zip(self.names.values(), self.starts, strict=True)]
+        last = [put(name, 0.0) for name, _ in self._last()]
+        return [*begin, *self._separate(), *block.first, *self._rows(), *self._rates(), *self._sums(1), *last]
 
-    def higher(self) -> list[str]:
+    def higher(self) -> list[Statement]:
         """Statements for order ``o``; ``shrink`` is 1/o. No order comes after ``order``."""
         block = self.block
-        inner = [f"{block.prefix}s{i} = out[o, {block.prefix}c{i}]" for i in range(len(block.pairs))]
-        step = [f"{name} = shrink*{block.prefix}r{i}" for i, name in enumerate(self.names.values())]
-        sums = below_highest(self._sums("o + 1"))
+        inner = [put(block.inner(i), at("out", o, block.beside(i))) for i in range(len(block.pairs))]
+        names = self.names.values()
+        step = [put(name, get("shrink") * self._rate(i)) for i, name in enumerate(names)]
+        sums = below_highest(self._sums(o + 1))
         ends = self._ends()
         sums = [*inner, *ends, *sums] if self._is_short else [*ends, *sums, *inner]
-        last = [f"{name} = {value}" for name, value in self._last().items()]
-        return [*sums, *step, *self._separate(), *block.higher, *self._rows(), *self.rates, *last]
+        last = [put(name, value) for name, value in self._last()]
+        return [*sums, *step, *self._separate(), *block.higher, *self._rows(), *self._rates(), *last]
 
-    def _separate(self) -> list[str]:
+    def _rate(self, place: int) -> Code:
+        return get(f"{self.block.prefix}r{place}")
+
+    def _rates(self) -> list[Statement]:
+        return [put(self._rate(i), value) for i, value in enumerate(self.values)]
+
+    def _separate(self) -> list[Statement]:
         """Write the columns of ``y`` that are not among the first ones, one by one."""
-        behind = [target for target in self.names if int(target) >= len(self.front)]
-        return [f"out[o, {target}] = {self.names[target]}" for target in behind]
+        behind = [target for target in self.names if target >= len(self.front)]
+        return [put(at("out", o, target), self.names[target]) for target in behind]
 
-    def _rows(self) -> list[str]:
+    def _rows(self) -> list[Statement]:
         """Write adjacent columns as one vector, so that they can soon be read as one vector."""
-        block, rows = self.block, [("0", self.front)]
-        values, found = list(block.pairs.values()), self.layers()
-        rows += [(each.right, [values[i] for i in each.places]) for each in found if each.right != each.left]
+        block, found = self.block, self.layers()
+        rows: list[tuple[Any, Sequence[Any]]] = [(0, self.front)]
+        values = list(block.pairs.values())
+        rows += [(get(row.right), [values[i] for i in row.places]) for row in found if row.right != row.left]
         if block.common_left is None:
-            rows += [(each.left, [f"out[o, {left}]" for left in each.lefts]) for each in found if each.lefts]
-        return [f"store_row(out, o, {column}, ({', '.join(values)},))" for column, values in rows]
+            rows += [
+                (get(row.left), [at("out", o, left) for left in row.lefts]) for row in found if row.lefts
+            ]
+        return [do("store_row", OUT, o, column, several(numbers)) for column, numbers in rows]
 
-    def _sums(self, order: str) -> list[str]:
+    def _sums(self, order: Any) -> list[Statement]:
         """The terms of an order that contain no order above the last but one."""
-        name = "convolve" if self.block.common_left else "convolve_pairs"
-        return [f"{name}(out, {order}, 2, {factors})" for factors in self._factors()]
+        name = "convolve" if self.block.common_left is not None else "convolve_pairs"
+        return [do(name, OUT, order, 2, *factors) for factors in self._factors()]
 
     @property
     def _is_short(self) -> bool:
         """Whether an order takes no longer than it takes to write a register and to read it."""
         return len(self.block.pairs) <= NARROW
 
-    def _last(self) -> dict[str, str]:
+    def _last(self) -> list[tuple[Code, Any]]:
         """Names of all factors' coefficients in the order before, with their values at the end of an order.
 
         Order two has one term with them. With few convolutions it is faster to keep them than to read them.
         """
         if not self._is_short:
-            return {}
-        found = {}
+            return []
+        found = list[tuple[Code, Any]]()
         for i, ((left, _), value) in enumerate(self.block.pairs.items()):
-            found[f"{self.block.prefix}q{i}"] = f"out[o, {left}] if o > 1 else 0.0"
-            found[f"{self.block.prefix}p{i}"] = value
+            found.append((self._before("q", i), either(less(1, o), at("out", o, left), 0.0)))
+            found.append((self._before("p", i), value))
         return found
 
-    def _ends(self) -> list[str]:
+    def _before(self, letter: str, place: int) -> Code:
+        return get(f"{self.block.prefix}{letter}{place}")
+
+    def _ends(self) -> list[Statement]:
         """The terms of order ``o`` with the order before; order one has none."""
-        prefix, common = self.block.prefix, self.block.common_left
-        name = "add_ends" if common else "add_ends_of_pairs"
-        found = [f"{name}(out, o, {factors})" for factors in self._factors()]
+        block = self.block
+        name = "add_ends" if block.common_left is not None else "add_ends_of_pairs"
+        found = [do(name, OUT, o, *factors) for factors in self._factors()]
         if self._is_short:
             found = []
-            for i, (left, _) in enumerate(self.block.pairs):
-                ends = f"{prefix}q{i}*out[1, {prefix}c{i}] + out[1, {left}]*{prefix}p{i}"
-                found.append(f"{prefix}s{i} = {prefix}s{i} + {ends}")
-        return ["if o > 1:", *indented(found)] if found else []
+            for i, (left, _) in enumerate(block.pairs):
+                q, p, inner = self._before("q", i), self._before("p", i), block.inner(i)
+                ends = q * at("out", 1, block.beside(i)) + at("out", 1, left) * p
+                found.append(put(inner, inner + ends))
+        return [when(less(1, o), found)] if found else []
 
-    def _factors(self) -> list[str]:
-        """Columns of the factors of all convolutions, their number and the widest register, as text."""
+    def _factors(self) -> list[tuple[Any, ...]]:
+        """Columns of the factors of all convolutions, their number and the widest register."""
         common = self.block.common_left
         return [
-            f"{common or each.left}, {each.right}, {padded(len(each.places))}, {WIDE}"
-            for each in self.layers()
+            (get(row.left) if common is None else common, get(row.right), padded(len(row.places)), WIDE)
+            for row in self.layers()
         ]
 
 
@@ -148,9 +172,9 @@ class TangentLoop:
     """
 
     def __init__(self, seeds: Sequence[Symbol], block: Recurrences) -> None:
-        block.rows |= {seed: f"v + {NARROW * i}" for i, seed in enumerate(seeds)}
+        block.rows |= {seed: get("v") + NARROW * i for i, seed in enumerate(seeds)}
         self.components, self.block = len(seeds), block
-        self.values: list[str] = []
+        self.values: list[Any] = []
 
     def compute(self, rates: Sequence[Expression]) -> None:
         """Write the recurrences of the rates; this also requests the series of the state that they need."""
@@ -161,37 +185,38 @@ class TangentLoop:
         """Number of columns that four tangent vectors need."""
         return NARROW * (self.components + sum(map(len, self.block.blocks.values())))
 
-    def first(self) -> list[str]:
+    def first(self) -> list[Statement]:
         """Statements for order zero, and for order one of the vectors themselves."""
-        later = self._later("1", "{}")
+        later = [self._later(1, i, value) for i, value in enumerate(self.values)]
         return [
-            f"spread_tangents(x, {self.components}, out, vectors, {self.columns})",
+            do("spread_tangents", get("x"), self.components, OUT, VECTORS, self.columns),
             *self._each([*self.block.first, *later]),
         ]
 
-    def higher(self) -> list[str]:
+    def higher(self) -> list[Statement]:
         """Statements for order ``o``, and for order ``o + 1`` of the vectors themselves."""
-        block = self.block
-        sums = []
+        block, sums = self.block, list[Statement]()
         for i, (left, rights) in enumerate(block.blocks.items()):
-            names = "".join(f"{block.prefix}s{i}_{place}, " for place in range(len(rights)))
-            factors = f"{left}, {block.prefix}b{i}, {NARROW * len(rights)}, {WIDE}"
-            sums.append(f"{names}= convolved(out, o, 1, {factors})")
-        later = self._later("o + 1", "later*({})")
+            names = several([block.inner(i, place) for place in range(len(rights))])
+            widths = NARROW * len(rights), WIDE
+            sums.append(put(names, call("convolved", OUT, o, 1, left, block.beside(i, 0), *widths)))
+        scale = get("later")
+        later = [self._later(o + 1, i, scale * value) for i, value in enumerate(self.values)]
         statements = self._each([*sums, *block.higher, *later])
-        return below_highest(["later = 1.0/(o + 1)", *statements])
+        return below_highest([put(scale, 1.0 / (o + 1)), *statements])
 
-    def _later(self, order: str, value: str) -> list[str]:
-        return [
-            f"store(out, {order}, v + {NARROW * i}, {value.format(each)})"
-            for i, each in enumerate(self.values)
-        ]
+    def _later(self, order: Any, place: int, value: Any) -> Statement:
+        return do("store", OUT, order, get("v") + NARROW * place, value)
 
-    def _each(self, statements: Iterable[str]) -> list[str]:
+    def _each(self, statements: Iterable[Statement]) -> list[Statement]:
         """Repeat the statements for all vectors, four at a time."""
-        bases, place = [], NARROW * self.components
+        start = put(get("v"), VECTORS + get("g") * self.columns)
+        return [loop("g", 0, GROUPS, [start, *statements])]
+
+    def places(self) -> dict[str, int]:
+        """By name: where the operands of products with a common factor begin, counted from ``v``."""
+        found, place = {}, NARROW * self.components
         for i, rights in enumerate(self.block.blocks.values()):
-            bases.append(f"{self.block.prefix}b{i} = v + {place}")
+            found[f"{self.block.prefix}b{i}"] = place
             place += NARROW * len(rights)
-        start = f"v = vectors + g*{self.columns}"
-        return ["for g in range(groups):", *indented([start, *bases, *statements])]
+        return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import attrs
 
@@ -30,11 +31,11 @@ class Layer:
 
     left: str
     right: str
-    lefts: tuple[str, ...]
+    lefts: tuple[Any, ...]
     places: tuple[int, ...]
 
 
-def layers(lefts: Sequence[str], squares: Sequence[bool], prefix: str) -> list[Layer]:
+def layers(lefts: Sequence[Any], squares: Sequence[bool], prefix: str) -> list[Layer]:
     """The layers of convolutions, given the column of each first factor and whether the second is the same.
 
     Of many convolutions, a layer has at most one for each first factor, in the order of the first layer.
@@ -45,7 +46,7 @@ def layers(lefts: Sequence[str], squares: Sequence[bool], prefix: str) -> list[L
     if len(lefts) < MANY:
         return together
     with_square = {left: place for place, left in enumerate(lefts) if squares[place]}
-    others: dict[str, list[int]] = {left: [] for left in lefts}
+    others: dict[Any, list[int]] = {left: [] for left in lefts}
     for place, left in enumerate(lefts):
         if not squares[place]:
             others[left].append(place)
@@ -59,7 +60,7 @@ def layers(lefts: Sequence[str], squares: Sequence[bool], prefix: str) -> list[L
     if len(stacked) * LEAST > len(lefts):
         return together
     found: list[Layer] = []
-    blocks: dict[str, tuple[str, ...]] = {}
+    blocks: dict[str, tuple[Any, ...]] = {}
     for number, places in enumerate(stacked):
         mine = tuple(lefts[place] for place in places)
         known = [name for name, held in blocks.items() if held[: len(mine)] == mine]

@@ -12,9 +12,9 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+from hybrid.compiler.statements.code import Code, Statement, at, call, do, either, equal, get, put
+from hybrid.compiler.statements.values import Constants, root_power
 from hybrid.compiler.taylor.sums import Term, added
-from hybrid.expression.code import power_text
-from hybrid.expression.constants import Constants
 from hybrid.expression.derivatives import derivative
 from hybrid.expression.graph import (
     Group,
@@ -50,11 +50,15 @@ from hybrid.kernels.types.codes import NARROW
 # Functions whose derivatives consist of operations with recurrences.
 BY_DERIVATIVE = (Log, Log1p, Expm1, Arcsin, Arccos, Arctan, Arcsinh, Arccosh, Arctanh)
 # A pair of functions, and the sign in the derivative of the second: cos' = -sin, cosh' = sinh.
-PAIRS = dict.fromkeys((Sin, Cos), (Sin, Cos, "-")) | dict.fromkeys((Sinh, Cosh), (Sinh, Cosh, ""))
+PAIRS = dict.fromkeys((Sin, Cos), (Sin, Cos, -1.0)) | dict.fromkeys((Sinh, Cosh), (Sinh, Cosh, 1.0))
 # ``y' = (1 -+ y^2) u'``.
 OWN_SQUARE = {Tanh: -1, Tan: 1}
 # Longer inner sums are not expanded: other expressions may need them too.
 MOST_TERMS = 4
+# The order of a coefficient, the matrix of all coefficients, and the reciprocal of the order.
+o, OUT, shrink = map(get, ("o", "out", "shrink"))
+# The coefficients of time from the first on.
+ONE_THEN_ZERO = either(equal(o, 1), 1.0, 0.0)
 
 
 class NoSeries(Exception):
@@ -69,7 +73,7 @@ class Recurrences:
     ``o``. Convolutions are split. The terms at both ends contain coefficients of this order. All terms
     between contain only lower orders, so they are summed early, all convolutions side by side, and those with
     the order before come last. ``pairs`` lists these convolutions: the column of the first factor and the
-    second factor, with the text of the second factor's coefficient. In every sum, the term known last is
+    second factor, with the code of the second factor's coefficient. In every sum, the term known last is
     added last, so that only one addition waits for it.
 
     With ``lanes``, a coefficient holds four numbers, one per tangent vector, in four columns. The four are
@@ -79,34 +83,33 @@ class Recurrences:
     Parameters
     ----------
     rows
-        By symbol: text of the column of ``out`` that holds its series.
+        By symbol: the column of ``out`` that holds its series.
     time
-        The symbol of time and the text of its coefficient of order one and above; None if the symbol is in
-        ``rows``.
+        The symbol of time and its coefficient of order one and above; None if the symbol is in ``rows``.
     allot
-        Function that allocates a new column and returns its text.
+        Function that allocates a new column and returns it.
     prefix
         Prefix of the names of local variables.
     known
         Recurrences that run before these and hold the series of all expressions without symbols of ``rows``.
     at_start
-        By expression: a text for order zero that is better than the text from its operations.
+        By expression: code for order zero that is better than the code from its operations.
     lanes
         Whether each symbol in ``rows`` represents four numbers.
     """
 
     def __init__(
         self,
-        rows: dict[Symbol, str],
-        time: tuple[Symbol, str] | None,
-        allot: Callable[[], str],
+        rows: Mapping[Symbol, Any],
+        time: tuple[Symbol, Code] | None,
+        allot: Callable[[], int],
         prefix: str,
         constants: Constants,
         known: Recurrences | None = None,
-        at_start: Mapping[Expression, str] | None = None,
+        at_start: Mapping[Expression, Any] | None = None,
         lanes: bool = False,
     ) -> None:
-        self.rows: dict[Any, str] = {**rows}
+        self.rows: dict[Any, Any] = {**rows}
         self.lanes = lanes
         self.time = time
         self.allot = allot
@@ -114,14 +117,14 @@ class Recurrences:
         self.constants = constants
         self.known = known
         self.at_start = at_start or {}
-        self.first: list[str] = []
-        self.higher: list[str] = []
-        self.pairs: dict[tuple[str, Expression], str] = {}
-        # The place of each pair.
-        self.places: dict[tuple[str, Expression], int] = {}
-        self.blocks: dict[str, list[Expression]] = {}
-        self.variables: dict[Expression, str] = {}
-        self.slopes: dict[Expression, str] = {}
+        self.first: list[Statement] = []
+        self.higher: list[Statement] = []
+        self.pairs: dict[tuple[Any, Expression], Any] = {}
+        # The place of each pair, or, with lanes, of each block and of each factor in it.
+        self.places: dict[Any, int] = {}
+        self.blocks: dict[Any, list[Expression]] = {}
+        self.variables: dict[Expression, Any] = {}
+        self.slopes: dict[Expression, int] = {}
         self.shared: Counter[Expression] = Counter()
         self.lateness: dict[Expression, int] = {}
         self.readiness: dict[Expression, tuple[int, int]] = {}
@@ -142,121 +145,133 @@ class Recurrences:
                 if node.is_product:
                     self.shared.update(node.args)
 
-    def coefficient(self, expression: Expression) -> str:
-        """Text of the coefficient of order ``o``."""
+    def coefficient(self, expression: Expression) -> Any:
+        """The coefficient of order ``o``."""
         if expression in self.variables:
             return self.variables[expression]
         if expression in self.rows:
-            return self.at("o", self.rows[expression])
+            return self.at(o, self.rows[expression])
         if self._is_known(expression):
             return self._known_coefficient(expression)
         if self._is_constant(expression):
-            return self._bind(expression, self.constants.name(expression), "0.0")
+            return self._bind(expression, self.constants.name(expression), 0.0)
         return self._operation(expression)
 
-    def row(self, expression: Expression) -> str:
-        """Text of the column that holds the series of the expression."""
+    def row(self, expression: Expression) -> Any:
+        """The column that holds the series of the expression."""
         if expression in self.rows:
             return self.rows[expression]
         if self._is_known(expression):
             assert self.known is not None
             return self.known.row(expression)
-        text = self.coefficient(expression)
+        value = self.coefficient(expression)
         if expression not in self.rows:
             self.rows[expression] = self.allot()
-            self._both(self.put("o", self.rows[expression], text))
+            self._both(self.put(self.rows[expression], value))
         return self.rows[expression]
 
-    def at(self, order: str, column: str) -> str:
-        """Text of an entry of a column of these recurrences."""
-        return f"load(out, {order}, {column})" if self.lanes else f"out[{order}, {column}]"
+    def at(self, order: Any, column: Any) -> Code:
+        """An entry of a column of these recurrences."""
+        return call("load", OUT, order, column) if self.lanes else at("out", order, column)
 
-    def put(self, order: str, column: str, value: str) -> str:
-        """Statement that writes an entry of a column of these recurrences."""
-        if self.lanes:
-            return f"store(out, {order}, {column}, {value})"
-        return f"out[{order}, {column}] = {value}"
+    def put(self, column: Any, value: Any) -> Statement:
+        """Statement that writes an entry of order ``o`` of a column of these recurrences."""
+        return do("store", OUT, o, column, value) if self.lanes else put(at("out", o, column), value)
+
+    def inner(self, *place: int) -> Code:
+        """The convolution of a pair without both ends; with lanes, of a block and a place in it."""
+        return get(f"{self.prefix}s{'_'.join(map(str, place))}")
+
+    def beside(self, *place: int) -> Code:
+        """The column of the second factor of a pair; with lanes, of a block and a place in it."""
+        if not self.lanes:
+            return get(f"{self.prefix}c{place[0]}")
+        return get("v") + get(f"{self.prefix}b{place[0]}") + NARROW * place[1]
 
     def _is_known(self, expression: Expression) -> bool:
         return self.known is not None and not mentions(expression, self.own)
 
-    def _known_coefficient(self, expression: Expression) -> str:
+    def _known_coefficient(self, expression: Expression) -> Code:
         assert self.known is not None
         row = self.known.row(expression)
-        return self.known.variables.get(expression, f"out[o, {row}]")
+        return self.known.variables.get(expression, at("out", o, row))
 
     def _is_constant(self, expression: Expression) -> bool:
         return not mentions(expression, self.own) and (
             self.known is None or self.known._is_constant(expression)
         )
 
-    def _both(self, statement: str) -> None:
+    def _both(self, statement: Statement) -> None:
         self.first.append(statement)
         self.higher.append(statement)
 
-    def _bind(self, expression: Expression, first: str, *higher: str, name: str | None = None) -> str:
-        """A variable for the expression: its value at order zero; above, its value and further statements."""
-        name = name or self._name(expression)
-        self.first.append(f"{name} = {self.at_start.get(expression, first)}")
-        value, *more = higher
-        self.higher += [f"{name} = {value}", *more]
+    def _bind(self, expression: Expression, first: Any, higher: Any) -> Code:
+        """A variable for the expression: its value at order zero, and above."""
+        name = self._name(expression)
+        self.first.append(put(name, self.at_start.get(expression, first)))
+        self.higher.append(put(name, higher))
         return name
 
-    def _name(self, expression: Expression) -> str:
-        return self.variables.setdefault(expression, f"{self.prefix}{len(self.variables)}")
+    def _name(self, expression: Expression) -> Any:
+        return self.variables.setdefault(expression, get(f"{self.prefix}{len(self.variables)}"))
 
-    def _kept(self, expression: Expression, column: str | None = None) -> tuple[str, str]:
+    def _divisor(self, name: Code) -> Code:
+        """The name of what a coefficient of this name is multiplied by in the place of a division."""
+        return get(f"{name[1]}d")
+
+    def _kept(self, expression: Expression, column: Any = None) -> tuple[Any, Any]:
         """Name and column of an expression whose recurrence reads its own earlier coefficients."""
-        self.rows[expression] = column or self.allot()
+        self.rows[expression] = self.allot() if column is None else column
         return self._name(expression), self.rows[expression]
 
     def _store(self, *expressions: Expression) -> None:
         for expression in expressions:
-            self._both(self.put("o", self.rows[expression], self.variables[expression]))
+            self._both(self.put(self.rows[expression], self.variables[expression]))
 
-    def _place(self, left: str, right: Expression) -> tuple[str, str]:
+    def _place(self, left: Any, right: Expression) -> tuple[Code, Code]:
         """A convolution with the column ``left``, without both ends, and the column of the other factor."""
         if self.lanes:
             rights = self.blocks.setdefault(left, [])
-            if right not in rights:
+            block = self.places.setdefault(left, len(self.blocks) - 1)
+            place = self.places.setdefault((left, right), len(rights))
+            if place == len(rights):
                 rights.append(right)
-            block, place = list(self.blocks).index(left), rights.index(right)
-            return f"{self.prefix}s{block}_{place}", f"{self.prefix}b{block} + {NARROW * place}"
-        self.pairs.setdefault((left, right), "")
+            return self.inner(block, place), self.beside(block, place)
+        self.pairs.setdefault((left, right), 0.0)
         place = self.places.setdefault((left, right), len(self.places))
-        return f"{self.prefix}s{place}", f"{self.prefix}c{place}"
+        return self.inner(place), self.beside(place)
 
     @property
-    def common_left(self) -> str | None:
-        """The column of the first factor, if all pairs have the same one."""
+    def common_left(self) -> Any:
+        """The column of the first factor if all pairs have the same one, else None."""
         lefts = {left for left, _ in self.pairs}
         return lefts.pop() if len(lefts) == 1 else None
 
-    def _beside(self, left: str, right: Expression) -> tuple[str, str, str]:
+    def _beside(self, left: Any, right: Expression) -> tuple[Code, Code, Any]:
         """The results of ``_place`` and the coefficient of the other factor, written to its column."""
         value = self.coefficient(right)
         inner, column = self._place(left, right)
         self._enter(left, right, column, value)
         return inner, column, value
 
-    def _enter(self, left: str, right: Expression, column: str, value: str) -> None:
+    def _enter(self, left: Any, right: Expression, column: Any, value: Any) -> None:
         """Give a convolution the coefficient of its other factor; all pairs are written together."""
         if self.lanes:
-            self._both(self.put("o", column, value))
+            self._both(self.put(column, value))
         else:
             self.pairs[left, right] = value
 
-    def _slope(self, u: Expression) -> str:
+    def _slope(self, u: Expression) -> int:
         """Column of ``o`` times the coefficients of ``u``: those of the derivative, shifted by one order."""
         if u not in self.slopes:
             value = self.coefficient(u)
             self.slopes[u] = self.allot()
-            self._both(f"out[o, {self.slopes[u]}] = o*{value}")
+            self._both(put(at("out", o, self.slopes[u]), o * value))
         return self.slopes[u]
 
-    def _operation(self, expression: Expression) -> str:
+    def _operation(self, expression: Expression) -> Any:
         if self.time is not None and expression == self.time[0]:
-            return self._bind(expression, "t", self.time[1])
+            return self._bind(expression, get("t"), self.time[1])
         if expression.is_sum:
             return self._sum(expression)
         if expression.is_product:
@@ -270,21 +285,21 @@ class Recurrences:
         if type(expression) in OWN_SQUARE:
             return self._own_square(expression)
         if expression.in_other_terms is not None:
-            text = self.coefficient(expression.in_other_terms(*expression.args))
-            return self._bind(expression, text, text)
+            value = self.coefficient(expression.in_other_terms(*expression.args))
+            return self._bind(expression, value, value)
         if isinstance(expression, BY_DERIVATIVE):
             return self._by_derivative(expression)
         if isinstance(expression, Level):
-            return self._bind(expression, f"np.floor({self.coefficient(*expression.args)})", "0.0")
+            return self._bind(expression, call("np.floor", self.coefficient(*expression.args)), 0.0)
         raise NoSeries(f"{expression.word} is not analytic")
 
-    def _sum(self, expression: Expression) -> str:
+    def _sum(self, expression: Expression) -> Code:
         terms = self._terms(expression)
         constant = add(*(factor for factor, rest in terms if rest is ONE))
         moving = [(factor, rest) for factor, rest in terms if rest is not ONE]
         first = added([self._times(*term) for term in moving])
         if constant is not ZERO:
-            first = f"{first} + {self.constants.name(constant)}"
+            first = first + self.constants.name(constant)
         return self._bind(expression, first, added([self._higher_times(*term) for term in moving]))
 
     def _terms(self, expression: Expression) -> list[tuple[Expression, Expression]]:
@@ -318,10 +333,10 @@ class Recurrences:
         return multiply(*constant), multiply(*(factor for factor in factors if factor not in constant))
 
     def _times(self, constant: Expression, rest: Expression) -> Term:
-        text = self.coefficient(rest)
+        value = self.coefficient(rest)
         if constant != 1:
-            text = f"{self.constants.name(constant)}*{text}"
-        return Term(self._ready(rest), text, constant != 1)
+            value = self.constants.name(constant) * value
+        return Term(self._ready(rest), value, constant != 1)
 
     def _higher_times(self, constant: Expression, rest: Expression) -> Term:
         """``_times`` above order zero, where a sum with one varying term is a multiple of that term."""
@@ -347,11 +362,11 @@ class Recurrences:
             self.readiness[expression] = depth, late
         return self.readiness[expression]
 
-    def _product(self, expression: Expression) -> str:
+    def _product(self, expression: Expression) -> Code:
         factors = expression.args
         if any(self._is_constant(factor) for factor in factors):
             term = self._split(expression)
-            return self._bind(expression, self._times(*term).text, self._higher_times(*term).text)
+            return self._bind(expression, self._times(*term).code, self._higher_times(*term).code)
         below = [f for f in factors if f.is_power and is_negative(f.exponent)]
         # A known divisor becomes a factor: the series of its reciprocal is stored.
         below = [f for f in below if self.known is None or mentions(f, self.own)]
@@ -364,37 +379,31 @@ class Recurrences:
         *others, last = sorted(factors, key=lambda factor: (-mentions(factor, self.own), self.shared[factor]))
         return self._convolution(expression, last, multiply(*others))
 
-    def _convolution(self, expression: Expression, a: Expression, b: Expression) -> str:
+    def _convolution(self, expression: Expression, a: Expression, b: Expression) -> Code:
         left = self.row(a)
         factor = self._known_coefficient(a) if self._is_known(a) else self.coefficient(a)
         inner, right, value = self._beside(left, b)
-        first = self.at("0", right)
-        return self._bind(
-            expression,
-            f"{factor}*{value}",
-            f"{inner} + {factor}*{first} + out[0, {left}]*{value}",
-        )
+        ends = factor * self.at(0, right), at("out", 0, left) * value
+        return self._bind(expression, factor * value, inner + ends[0] + ends[1])
 
-    def _quotient(self, expression: Expression, above: Expression | None, below: Expression) -> str:
-        text = None if above is None else self.coefficient(above)
+    def _quotient(self, expression: Expression, above: Expression | None, below: Expression) -> Code:
+        dividend = None if above is None else self.coefficient(above)
         divisor, value = self.row(below), self.coefficient(below)
         inner, column = self._place(divisor, expression)
         name, column = self._kept(expression, column)
         # The minus sign is included here, so that no term has to be negated.
-        self.first.append(f"{name}d = -1.0/{value}")
-        inner = inner if text is None else f"({inner} - {text})"
-        self._bind(
-            expression,
-            f"{text or '1.0'}/{value}",
-            f"({inner} + {value}*out[0, {column}])*{name}d",
-        )
+        self.first.append(put(self._divisor(name), -1.0 / value))
+        inner = inner if dividend is None else inner - dividend
+        first = (1.0 if dividend is None else dividend) / value
+        self._bind(expression, first, (inner + value * at("out", 0, column)) * self._divisor(name))
         self._enter(divisor, expression, column, name)
         return name
 
-    def _power(self, expression: Expression) -> str:
+    def _power(self, expression: Expression) -> Code:
         base, exponent = expression.args
         if not self._is_constant(exponent):
-            return self._bind(expression, *2 * (self.coefficient(Exp(exponent * Log(base))),))
+            value = self.coefficient(Exp(exponent * Log(base)))
+            return self._bind(expression, value, value)
         if is_whole(exponent) and is_negative(exponent):
             return self._quotient(expression, None, power(base, -exponent))
         if is_whole(exponent):
@@ -407,68 +416,65 @@ class Recurrences:
         inner, column = self._place(u, expression)
         moving, copy = self._place(slope, expression)
         name, column = self._kept(expression, column)
-        self.first.append(f"{name}d = 1.0/{value}")
-        self._bind(
-            expression,
-            power_text(value, exponent, k),
-            f"({k}*({moving} + out[o, {slope}]*out[0, {column}]) + {moving} - o*{inner})*shrink*{name}d",
-        )
+        self.first.append(put(self._divisor(name), 1.0 / value))
+        whole = moving + at("out", o, slope) * at("out", 0, column)
+        higher = (k * whole + moving - o * inner) * shrink * self._divisor(name)
+        self._bind(expression, root_power(value, exponent, k), higher)
         self._enter(u, expression, column, name)
         self._enter(slope, expression, copy, name)
         return name
 
-    def _rate(self, u: Expression) -> str | None:
+    def _rate(self, u: Expression) -> Any:
         """The constant rate of an argument that is linear in time; None for other arguments."""
-        if self.time is None or self.time[1] != ONE_THEN_ZERO:
+        if self.time is None or self.time[1] is not ONE_THEN_ZERO:
             return None
         if mentions(u, [each for each in self.own if each is not self.time[0]]):
             return None
         slope = derivative(u, self.time[0])
         return self.constants.name(slope) if self._is_constant(slope) else None
 
-    def _exponential(self, expression: Expression, u: Expression) -> str:
+    def _exponential(self, expression: Expression, u: Expression) -> Code:
         rate = self._rate(u)
-        argument = self.coefficient(u)
-        if rate:
+        first = call("exp", self.coefficient(u))
+        if rate is not None:
             name, column = self._kept(expression)
-            self._bind(expression, f"exp({argument})", f"shrink*{rate}*out[o - 1, {column}]")
+            self._bind(expression, first, shrink * rate * at("out", o - 1, column))
             self._store(expression)
             return name
         slope = self._slope(u)
         inner, column = self._place(slope, expression)
         name, column = self._kept(expression, column)
-        value = f"({inner} + out[o, {slope}]*out[0, {column}])*shrink"
-        self._bind(expression, f"exp({argument})", value)
+        self._bind(expression, first, _integrated(inner, slope, column))
         self._enter(slope, expression, column, name)
         return name
 
-    def _pair(self, expression: Expression) -> str:
+    def _pair(self, expression: Expression) -> Any:
         odd, even, sign = PAIRS[type(expression)]
         (u,) = expression.args
         s, c = odd(u), even(u)
         rate = self._rate(u)
         argument = self.coefficient(u)
-        if rate:
+        if rate is not None:
             (s_name, s_column), (c_name, c_column) = self._kept(s), self._kept(c)
-            values = [f"shrink*{rate}*out[o - 1, {c_column}]", f"{sign}shrink*{rate}*out[o - 1, {s_column}]"]
+            values = (
+                shrink * rate * at("out", o - 1, c_column),
+                sign * shrink * rate * at("out", o - 1, s_column),
+            )
         else:
             slope = self._slope(u)
             (s_sum, s_column), (c_sum, c_column) = (self._place(slope, each) for each in (s, c))
             (s_name, _), (c_name, _) = self._kept(s, s_column), self._kept(c, c_column)
-            values = [
-                f"({c_sum} + out[o, {slope}]*out[0, {c_column}])*shrink",
-                f"{sign}({s_sum} + out[o, {slope}]*out[0, {s_column}])*shrink",
-            ]
-        self.first += [f"{s_name} = {odd.code}({argument})", f"{c_name} = {even.code}({argument})"]
-        self.higher += [f"{s_name} = {values[0]}", f"{c_name} = {values[1]}"]
-        if rate:
+            values = _integrated(c_sum, slope, c_column), sign * _integrated(s_sum, slope, s_column)
+        self.first += [put(s_name, call(odd.code, argument)), put(c_name, call(even.code, argument))]
+        self.higher += [put(s_name, values[0]), put(c_name, values[1])]
+        if rate is not None:
             self._store(s, c)
         else:
             self._enter(slope, s, s_column, s_name)
             self._enter(slope, c, c_column, c_name)
         return self.variables[expression]
 
-    def _own_square(self, expression: Expression) -> str:
+    def _own_square(self, expression: Expression) -> Code:
         sign = OWN_SQUARE[type(expression)]
         (u,) = expression.args
         argument, rate = self.coefficient(u), self._slope(u)
@@ -477,24 +483,22 @@ class Recurrences:
         name, row = self._kept(expression)
         slope_name, _ = self._kept(slope, slope_column)
         inner, copy = self._place(row, expression)
-        self.first.append(f"{name} = {expression.code}({argument})")
-        self.higher.append(f"{name} = ({moving} + out[o, {rate}]*out[0, {slope_column}])*shrink")
+        self.first.append(put(name, call(expression.code, argument)))
+        self.higher.append(put(name, _integrated(moving, rate, slope_column)))
         self._store(expression)
         self._enter(row, expression, copy, name)
-        self.first.append(f"{slope_name} = 1.0 + {sign}.0*{name}*{name}")
-        self.higher.append(f"{slope_name} = {sign}.0*({inner} + 2.0*out[0, {row}]*{name})")
+        self.first.append(put(slope_name, 1.0 + float(sign) * name * name))
+        self.higher.append(put(slope_name, float(sign) * (inner + 2.0 * at("out", 0, row) * name)))
         self._enter(rate, slope, slope_column, slope_name)
         return name
 
-    def _by_derivative(self, expression: Expression) -> str:
+    def _by_derivative(self, expression: Expression) -> Code:
         (u,) = expression.args
         argument, rate = self.coefficient(u), self._slope(u)
         inner, slope, _ = self._beside(rate, expression.slope())
-        return self._bind(
-            expression,
-            f"{expression.code}({argument})",
-            f"({inner} + out[o, {rate}]*out[0, {slope}])*shrink",
-        )
+        return self._bind(expression, call(expression.code, argument), _integrated(inner, rate, slope))
 
 
-ONE_THEN_ZERO = "(1.0 if o == 1 else 0.0)"
+def _integrated(inner: Code, slope: Any, column: Any) -> Code:
+    """The coefficient of what has a product as its rate: its inner terms, then the one of this order."""
+    return (inner + at("out", o, slope) * at("out", 0, column)) * shrink

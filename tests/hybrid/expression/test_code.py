@@ -8,10 +8,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from hybrid.expression.code import IMPORTS, assignments, power_text, unprintable
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from hybrid.expression.code import IMPORTS, assignments, power_text, unprintable
 from hybrid.expression.derivatives import jacobian_of
 from hybrid.expression.nodes import ONE, TWO, Function, number
 from hybrid.expression.operations import (

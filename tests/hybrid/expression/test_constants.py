@@ -4,6 +4,7 @@ import math
 from fractions import Fraction
 
 from hybrid.expression.constants import Constants
+
 from hybrid.expression.nodes import Symbol, number
 
 

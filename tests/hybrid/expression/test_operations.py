@@ -5,6 +5,7 @@ from contextlib import nullcontext, suppress
 
 import numpy as np
 import pytest
+from hybrid.expression.code import assignments, unprintable
 from numba import njit
 
 from hybrid import HybridSystem, Mode
@@ -13,7 +14,6 @@ from hybrid.compiler.emit import emit
 from hybrid.compiler.llvm.lowering import VECTOR_SIGNATURE
 from hybrid.compiler.parts import PARTS, SERIES
 from hybrid.expression import operations as ops
-from hybrid.expression.code import assignments, unprintable
 from hybrid.expression.derivatives import derivative
 from hybrid.expression.evaluation import Program, expressed
 from hybrid.expression.nodes import HALF, ONE, Function, number

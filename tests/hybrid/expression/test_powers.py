@@ -6,11 +6,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from hybrid.expression.code import IMPORTS, assignments
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybrid import DOP853, HybridSystem, Mode, Taylor, simulate, split
-from hybrid.expression.code import IMPORTS, assignments
 from hybrid.expression.derivatives import jacobian_of
 from hybrid.expression.tracing import model_symbols, trace
 

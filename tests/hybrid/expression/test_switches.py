@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-
 from hybrid.expression.code import assignments
+
 from hybrid.expression.graph import symbols_of
 from hybrid.expression.implications import MOST_TERMS
 from hybrid.expression.nodes import Number, add

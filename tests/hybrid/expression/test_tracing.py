@@ -2,9 +2,9 @@ import math
 
 import numpy as np
 import pytest
+from hybrid.expression.code import assignments
 
 from hybrid.errors import ModelError
-from hybrid.expression.code import assignments
 from hybrid.expression.nodes import number
 from hybrid.expression.tracing import model_symbols, trace
 from hybrid.expression.values import TraceError

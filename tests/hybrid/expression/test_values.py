@@ -6,8 +6,8 @@ import warnings
 
 import numpy as np
 import pytest
-
 from hybrid.expression.code import assignments
+
 from hybrid.expression.tracing import trace
 from hybrid.expression.values import TraceError, _content
 

@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from hybrid.expression.code import assignments, power_text
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from llvmlite import binding, ir
@@ -14,7 +15,6 @@ from llvmlite import binding, ir
 from hybrid.compiler.llvm.calls import NUMBER, WHOLE
 from hybrid.compiler.llvm.lowering import MATRIX_SIGNATURE, VECTOR_SIGNATURE, LoweringError, parsed
 from hybrid.compiler.llvm.machine import machine_code
-from hybrid.expression.code import assignments, power_text
 from hybrid.expression.nodes import Number
 from hybrid.kernels.types.numba_door.builder import Builder
 from tests.hybrid.expression.formulas import anything, expression_of

@@ -3,6 +3,7 @@
 import mpmath as mp
 import numpy as np
 import pytest
+from hybrid.expression.constants import Constants
 
 from hybrid import Guard, HybridSystem, Mode, Transition, simulate
 from hybrid.compiler.emit import emit
@@ -10,7 +11,6 @@ from hybrid.compiler.parts import PARTS, SERIES, TANGENT_SERIES
 from hybrid.compiler.taylor import pairs
 from hybrid.compiler.taylor.series import Recurrences
 from hybrid.compiler.taylor.sums import Term, added
-from hybrid.expression.constants import Constants
 from hybrid.expression.nodes import Symbol
 from hybrid.kernels.types.codes import DESINGULARISED, EXACT, NARROW, RUNGE_KUTTA, TAYLOR
 
