@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterable, Iterator, Sequence
 
 from hybrid.compiler.statements.code import Statement
+from hybrid.compiler.statements.rolled import rolled
 
 # The indices of a case, and its statements as JSON. A case without indices is run for every index.
 Case = tuple[tuple[int, ...], str]
@@ -19,7 +20,8 @@ def cases_of_index(bodies: Iterable[Sequence[Statement]]) -> list[Case]:
     indices: dict[str, list[int]] = {}
     for index, statements in enumerate(bodies):
         if statements:
-            indices.setdefault(json.dumps(statements, separators=(",", ":")), []).append(index)
+            body = json.dumps(rolled(statements), separators=(",", ":"))
+            indices.setdefault(body, []).append(index)
     return [(tuple(places), body) for body, places in indices.items()]
 
 

@@ -37,13 +37,10 @@ class Call:
         Called with the builder and the arguments; returns the value.
     on_numbers
         Whether all arguments are floats.
-    known
-        Positions of the arguments that are written as integers in the text.
     """
 
     writer: Callable[..., Any]
     on_numbers: bool = False
-    known: tuple[int, ...] = ()
 
     def __call__(self, builder: Any, *arguments: Any) -> Any:
         """Write the instructions."""
@@ -142,15 +139,15 @@ CALLS = {
     "store": Call(_store),
     "store_down": Call(write_down),
     "store_row": Call(write_row),
-    "table": Call(_table, known=(1, 2, 3, 4)),
+    "table": Call(_table),
     "four_times": Call(lambda builder, number: everywhere(builder, number, NARROW)),
-    "convolve": Call(write_convolution, known=(5, 6)),
-    "convolve_pairs": Call(partial(write_convolution, pairs=True), known=(5, 6)),
-    "convolved": Call(write_convolved, known=(5, 6)),
-    "add_ends": Call(write_ends, known=(4, 5)),
-    "add_ends_of_pairs": Call(partial(write_ends, pairs=True), known=(4, 5)),
-    "combine": Call(write_combination, known=(3,)),
-    "combine_tangents": Call(write_combination_of_tangents, known=(3, 5)),
+    "convolve": Call(write_convolution),
+    "convolve_pairs": Call(partial(write_convolution, pairs=True)),
+    "convolved": Call(write_convolved),
+    "add_ends": Call(write_ends),
+    "add_ends_of_pairs": Call(partial(write_ends, pairs=True)),
+    "combine": Call(write_combination),
+    "combine_tangents": Call(write_combination_of_tangents),
     "divided_dot_product": Call(write_divided_dot_product),
-    "spread_tangents": Call(_spread, known=(1,)),
+    "spread_tangents": Call(_spread),
 }

@@ -14,6 +14,7 @@ import attrs
 from llvmlite import ir
 
 from hybrid.compiler.llvm.calls import CALLS, NUMBER, WHOLE
+from hybrid.compiler.statements.code import KNOWN
 from hybrid.kernels.instructions.loops import loop
 from hybrid.kernels.instructions.registers import Matrix, everywhere, vector_of
 from hybrid.kernels.types.codes import NARROW
@@ -405,7 +406,7 @@ class _Body:
         call = CALLS[name]
         arguments = []
         for place, term in enumerate(terms):
-            value = term if place in call.known else self.value(term)
+            value = term if place in KNOWN.get(name, ()) else self.value(term)
             if isinstance(value, tuple):
                 value = [self.number(each) for each in value]
             arguments.append(self.number(value) if call.on_numbers else value)

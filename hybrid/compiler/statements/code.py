@@ -32,6 +32,19 @@ from collections.abc import Sequence
 from typing import Any
 
 Statement = tuple[Any, ...]
+# Positions of arguments that are part of a call itself, counted from zero, and of items.
+KNOWN = {
+    "item": (1,),
+    "table": (1, 2, 3, 4),
+    "convolve": (5, 6),
+    "convolve_pairs": (5, 6),
+    "convolved": (5, 6),
+    "add_ends": (4, 5),
+    "add_ends_of_pairs": (4, 5),
+    "combine": (3,),
+    "combine_tangents": (3, 5),
+    "spread_tangents": (1,),
+}
 
 
 class Code(tuple[Any, ...]):

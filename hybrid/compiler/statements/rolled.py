@@ -1,0 +1,372 @@
+"""Loops for statements that repeat: a chain of four hundred masses is as much code as one mass.
+
+Statements repeat if they differ in numbers and names alone. Those that do not wait for one another become one
+loop; what differs from turn to turn is a multiple of the turn, or comes from a list. Variables that are set in
+such a loop, or that differ from turn to turn, are cells of an array.
+
+Nothing is known of chains, rings or lattices here, and neither is of fields or series.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+import attrs
+
+from hybrid.compiler.statements.code import KNOWN, Code, Statement, at, call, get, loop, put
+from hybrid.kernels.types.codes import NARROW
+
+# A loop with its lists is about as much code as so many statements; fewer stay as they are.
+LEAST = 12
+NUMBER, LANES, WHOLE, TRUTH = range(4)
+# The array of all cells of a kind.
+CELLS = {NUMBER: "numbers", LANES: "lanes"}
+TURN = get("turn")
+# What calls return, if it is not a number.
+RETURNED = {
+    "load": LANES,
+    "four_times": LANES,
+    "convolved": LANES,
+    "divided_dot_product": LANES,
+    "length": WHOLE,
+}
+IN_WHOLE_NUMBERS = ("+", "-", "*", "//")
+CONDITIONS = ("<", "<=", ">", ">=", "==", "!=", "and", "or", "not")
+
+
+def rolled(statements: Sequence[Statement]) -> Sequence[Statement]:
+    """The same statements with loops for those that repeat; as they are if there are none."""
+    if sum(1 for _ in _simple(statements)) < LEAST:
+        return statements
+    roller = _Roller(statements)
+    plan = roller.planned(statements)
+    if not roller.cells and not roller.has_loops:
+        return statements
+    sizes = [sum(kind == each for kind, _ in roller.cells.values()) for each in CELLS]
+    arrays = [("array", name, size) for name, size in zip(CELLS.values(), sizes, strict=True) if size]
+    return [*arrays, *roller.written(plan)]
+
+
+def _simple(statements: Iterable[Statement]) -> Iterator[Statement]:
+    """All statements but loops and branches, also those in them."""
+    for statement in statements:
+        if statement[0] == "for":
+            yield from _simple(statement[5])
+        elif statement[0] == "when":
+            yield from _simple(statement[2])
+            yield from _simple(statement[3])
+        else:
+            yield statement
+
+
+@attrs.frozen
+class _Repeated:
+    """Statements of one shape that do not wait for one another; ``slots`` by statement, what differs."""
+
+    statements: Sequence[Statement]
+    slots: Sequence[Sequence[Any]]
+
+
+class _Roller:
+    """Plans which statements of a function become loops, then writes them."""
+
+    def __init__(self, statements: Sequence[Statement]) -> None:
+        self.whole = {each[1]: each[2] for each in statements if each[0] == "whole"}
+        # The kinds of variables, and the place of each cell.
+        self.kinds: dict[str, int] = {}
+        self.cells: dict[str, tuple[int, int]] = {}
+        self.has_loops = False
+        for statement in _simple(statements):
+            if statement[0] == "set":
+                self._learn(statement[1], statement[2])
+
+    def _learn(self, place: Code, term: Any) -> None:
+        if place[0] == "get":
+            self.kinds.setdefault(place[1], self._kind(term))
+        elif place[0] == "several":
+            self.kinds |= dict.fromkeys((each[1] for each in place[1:]), self._kind(term))
+
+    def _kind(self, term: Any) -> int:
+        """What a term is: a number, four numbers, a whole number or a truth value."""
+        if type(term) is int:
+            return WHOLE
+        if type(term) is float:
+            return NUMBER
+        operation, *parts = term
+        if operation == "get":
+            return self.kinds.get(parts[0], NUMBER if parts[0] == "t" else WHOLE)
+        if operation in CONDITIONS:
+            return TRUTH
+        if operation in ("at", "item", "if", "listed"):
+            return NUMBER
+        if operation in IN_WHOLE_NUMBERS or operation in ("/", "neg"):
+            kinds = {self._kind(part) for part in parts}
+            if LANES in kinds:
+                return LANES
+            return WHOLE if kinds == {WHOLE} and operation != "/" else NUMBER
+        return RETURNED.get(operation, NUMBER)
+
+    # The plan: statements, loops and branches as they are, and what is repeated.
+
+    def planned(self, statements: Sequence[Statement]) -> list[Any]:
+        """Statements, and ``_Repeated`` in the place of those that repeat; also inside loops and branches."""
+        plan, straight = list[Any](), list[Statement]()
+        for statement in self._entry_by_entry(statements):
+            if _is_straight(statement):
+                straight.append(statement)
+                continue
+            plan += self._grouped(straight)
+            straight = []
+            bodies = _bodies(statement)
+            plan.append((statement, *map(self.planned, bodies)) if bodies else statement)
+        return plan + self._grouped(straight)
+
+    def _entry_by_entry(self, statements: Iterable[Statement]) -> Iterator[Statement]:
+        """A long row is written entry by entry, as long as its values are many."""
+        for statement in statements:
+            if statement[0] == "do" and statement[1][0] == "store_row":
+                _, array, row, column, (_, *values) = statement[1]
+                if len(values) >= LEAST:
+                    first = self.whole.get(column[1], column) if isinstance(column, tuple) else column
+                    values += [0.0] * (-len(values) % NARROW)
+                    yield from (put(at(array[1], row, first + i), value) for i, value in enumerate(values))
+                    continue
+            yield statement
+
+    def _grouped(self, statements: list[Statement]) -> list[Any]:
+        if len(statements) < LEAST:
+            return [*statements]
+        levels = _Order(self.whole)
+        groups: dict[Any, list[tuple[Statement, list[Any]]]] = {}
+        for statement in statements:
+            slots: list[Any] = []
+            shape = self._shape(statement, slots)
+            groups.setdefault((levels.of(statement), shape), []).append((statement, slots))
+        if max(map(len, groups.values())) < LEAST:
+            return [*statements]
+        plan = list[Any]()
+        # Statements of one level do not wait for one another, so its groups may come in any order.
+        for (_, _), group in sorted(groups.items(), key=lambda item: item[0][0]):
+            members, slots = [statement for statement, _ in group], [each for _, each in group]
+            if len(group) < LEAST:
+                plan += members
+                continue
+            self.has_loops = True
+            self._allot_cells(members, slots)
+            plan.append(_Repeated(members, slots))
+        return plan
+
+    def _shape(self, term: Any, slots: list[Any]) -> Any:
+        """A statement or a term without its numbers and variables, which are appended to ``slots``."""
+        kind = type(term)
+        if kind is int or kind is float:
+            slots.append(term)
+            return kind
+        if kind is str:
+            return term
+        if term[0] == "get":
+            name = term[1]
+            if name in self.whole:
+                slots.append(self.whole[name])
+                return int
+            if self.kinds.get(name) in CELLS:
+                slots.append(name)
+                return self.kinds[name]
+            return term
+        known = KNOWN.get(term[0], ())
+        # The operation comes before the arguments.
+        return tuple(
+            part if place - 1 in known else self._shape(part, slots) for place, part in enumerate(term)
+        )
+
+    def _allot_cells(self, members: Sequence[Statement], slots: Sequence[Sequence[Any]]) -> None:
+        for statement in members:
+            for name in _names_set(statement):
+                self._allot(name)
+        for column in zip(*slots, strict=True):
+            if type(column[0]) is str and len(set(column)) > 1:
+                for name in column:
+                    self._allot(name)
+
+    def _allot(self, name: str) -> None:
+        kind = self.kinds[name]
+        if name not in self.cells:
+            self.cells[name] = kind, sum(other == kind for other, _ in self.cells.values())
+
+    # The statements.
+
+    def written(self, plan: Iterable[Any]) -> list[Statement]:
+        """The statements of a plan."""
+        found = list[Statement]()
+        for each in plan:
+            if isinstance(each, _Repeated):
+                found.append(self._loop(each))
+            elif type(each[0]) is tuple:
+                statement, *plans = each
+                kept = statement[: -len(plans)]
+                found.append((*map(self._plain, kept), *map(self.written, plans)))
+            else:
+                found.append(self._plain(each))
+        return found
+
+    def _plain(self, term: Any) -> Any:
+        """A statement or a term with cells in the place of variables."""
+        if not isinstance(term, tuple):
+            return term
+        if term[0] == "get":
+            return self._cell(term[1]) if term[1] in self.cells else term
+        return Code(map(self._plain, term))
+
+    def _cell(self, name: str) -> Code:
+        kind, place = self.cells[name]
+        return at(CELLS[kind], place)
+
+    def _loop(self, group: _Repeated) -> Statement:
+        columns = iter([self._varying(column) for column in zip(*group.slots, strict=True)])
+        body = self._filled(group.statements[0], columns)
+        return loop(TURN[1], 0, len(group.statements), [body])
+
+    def _filled(self, term: Any, columns: Iterator[Any]) -> Any:
+        """The first statement of a group, with what varies in the place of its numbers and variables."""
+        kind = type(term)
+        if kind is int or kind is float:
+            return next(columns)
+        if kind is str:
+            return term
+        if term[0] == "get":
+            name = term[1]
+            return next(columns) if name in self.whole or self.kinds.get(name) in CELLS else term
+        known = KNOWN.get(term[0], ())
+        return Code(
+            part if place - 1 in known else self._filled(part, columns) for place, part in enumerate(term)
+        )
+
+    def _varying(self, column: Sequence[Any]) -> Any:
+        """A number or a variable that differs from turn to turn."""
+        first = column[0]
+        if len(set(column)) == 1:
+            return (self._cell(first) if first in self.cells else get(first)) if type(first) is str else first
+        if type(first) is str:
+            kind, _ = self.cells[first]
+            return at(CELLS[kind], self._varying([self.cells[name][1] for name in column]))
+        stride = column[1] - first
+        if type(first) is int and all(each == first + stride * k for k, each in enumerate(column)):
+            scaled = TURN if stride == 1 else TURN * stride
+            return scaled + first if first else scaled
+        return call("listed", tuple(column), TURN)
+
+
+def _is_straight(statement: Statement) -> bool:
+    """Whether all that a statement reads and writes is written in it."""
+    if statement[0] == "set":
+        return True
+    return statement[0] == "do" and statement[1][0] == "store"
+
+
+def _bodies(statement: Statement) -> Sequence[Any]:
+    return {"for": statement[5:], "when": statement[2:]}.get(statement[0], ())
+
+
+def _names_set(statement: Statement) -> list[str]:
+    if statement[0] == "do" or statement[1][0] == "at":
+        return []
+    places = statement[1][1:] if statement[1][0] == "several" else [statement[1]]
+    return [place[1] for place in places]
+
+
+class _Order:
+    """How many statements each statement waits for, one after the other.
+
+    A statement waits for those before it that write what it reads or writes, and for those that read what it
+    writes. Columns that are counted from a variable lie apart from those that are numbers.
+    """
+
+    def __init__(self, whole: dict[str, int]) -> None:
+        self.whole = whole
+        self.read: dict[Any, int] = {}
+        self.write: dict[Any, int] = {}
+
+    def of(self, statement: Statement) -> int:
+        """The level of the next statement; those of one level may come in any order."""
+        reads, writes = list[Any](), list[Any]()
+        if statement[0] == "do":
+            _, array, *place, value = statement[1]
+            writes.append(self._cell(array[1], place))
+            self._find(value, reads)
+        else:
+            target, value = statement[1], statement[2]
+            self._find(value, reads)
+            for each in target[1:] if target[0] == "several" else [target]:
+                if each[0] == "at":
+                    writes.append(self._cell(each[1], each[2:]))
+                    for index in each[2:]:
+                        self._find(index, reads)
+                else:
+                    writes.append(each[1])
+        level = 0
+        for key in reads:
+            level = max(level, self._latest(self.write, key))
+        for key in writes:
+            level = max(level, self._latest(self.write, key), self._latest(self.read, key))
+        for known, keys in ((self.read, reads), (self.write, writes)):
+            for key in keys:
+                for each in _covering(key):
+                    known[each] = max(known.get(each, 0), level + 1)
+        return level
+
+    def _latest(self, known: dict[Any, int], key: Any) -> int:
+        """The level behind all accesses so far that may be of the same place."""
+        if type(key) is str:
+            return known.get(key, 0)
+        array, row, column = key
+        if row is None:
+            return known.get((array, "any", column), 0)
+        return max(known.get(key, 0), known.get((array, None, column), 0))
+
+    def _find(self, term: Any, found: list[Any]) -> None:
+        """Append what a term reads."""
+        if not isinstance(term, tuple):
+            return
+        operation, *parts = term
+        if operation == "get":
+            found.append(parts[0])
+        elif operation == "at":
+            found.append(self._cell(parts[0], parts[1:]))
+            for index in parts[1:]:
+                self._find(index, found)
+        elif operation == "load":
+            found.append(self._cell(parts[0][1], parts[1:]))
+        elif operation == "convolved":
+            # It reads orders that are complete: nothing that statements beside it write.
+            return
+        else:
+            for part in parts:
+                self._find(part, found)
+
+    def _cell(self, array: str, place: Sequence[Any]) -> Any:
+        """A key for an entry: array, row if it is a number, and column."""
+        if len(place) == 1:
+            # The state may be overwritten by the result.
+            return "x" if array == "out" else array, 0, self._column(place[0])
+        row, column = place
+        return array, row if type(row) is int else None, self._column(column)
+
+    def _column(self, term: Any) -> Any:
+        """An index as the variables that it is counted from, and a number."""
+        if type(term) is int:
+            return (), term
+        if term[0] == "get":
+            return ((), self.whole[term[1]]) if term[1] in self.whole else ((term[1],), 0)
+        if term[0] == "+":
+            (one, first), (other, second) = map(self._column, term[1:])
+            return one + other, first + second
+        return (term,), 0
+
+
+def _covering(key: Any) -> list[Any]:
+    """The keys under which an access is noted."""
+    if type(key) is str:
+        return [key]
+    array, _, column = key
+    return [key, (array, "any", column)]
