@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import reduce
 from operator import add
+from typing import Any
 
 import attrs
 
@@ -105,19 +106,22 @@ def variational(field: Written, n: int) -> list[Statement]:
     """
     if field.expressions is None or field.jacobian is None or field.given:
         statements = [*field.value, *(("set", _entry_of(place), term) for _, place, term in field.derivative)]
-        known = {place[2:] for _, place, _ in field.derivative if place[0] == "at"}
+        known: dict[Any, Term] = {
+            each[2:]: _entry(*each[2:]) for _, each, _ in field.derivative if each[0] == "at"
+        }
     else:
         rows = [(i, j, entry) for i, row in enumerate(field.jacobian) for j, entry in enumerate(row[:n])]
         rows = [(i, j, entry) for i, j, entry in rows if entry is not ZERO]
-        known = {(i, j) for i, j, _ in rows}
-        targets = [*(at("out", i) for i in range(n)), *(_entry(i, j) for i, j, _ in rows)]
-        statements = assignments(targets, [*field.expressions, *(entry for _, _, entry in rows)])
+        known = {(i, j): float(entry) if entry.is_number else _entry(i, j) for i, j, entry in rows}
+        moving = [(i, j, entry) for i, j, entry in rows if not entry.is_number]
+        targets = [*(at("out", i) for i in range(n)), *(_entry(i, j) for i, j, _ in moving)]
+        statements = assignments(targets, [*field.expressions, *(entry for _, _, entry in moving)])
     by_row: list[list[Term]] = [[] for _ in range(n)]
     for i, j in sorted(known):
         if j < n:
-            by_row[i].append(_entry(i, j) * at("x", get("v") + j))
+            by_row[i].append(known[i, j] * at("x", get("v") + j))
     moved = [put(at("out", get("v") + i), _added(terms)) for i, terms in enumerate(by_row)]
-    trace = _added([_entry(i, i) for i in range(n) if (i, i) in known])
+    trace = _added([known[i, i] for i in range(n) if (i, i) in known])
     length = call("length", "x")
     return [*statements, loop("v", n, length, moved, step=n), put(at("out", length), trace)]
 

@@ -115,9 +115,10 @@ def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction | C
     cases: dict[str, list[Any]] = {name: [] for name in names}
     for name, (indices, body) in cases_in(source):
         cases[name].append((indices, json.loads(body)))
+    repeats = '["repeat",' in source
     kinds = {name: name.partition(CASE)[0] for name in names}
     wanted = [
-        Function(name, SIGNATURES.get(kind, VECTOR_SIGNATURE), cases[name], kind in FUSED)
+        Function(name, SIGNATURES.get(kind, VECTOR_SIGNATURE), cases[name], kind in FUSED, repeats)
         for name, kind in kinds.items()
     ]
     return machine_code(wanted, calls)

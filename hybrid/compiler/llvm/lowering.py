@@ -103,12 +103,15 @@ class Function:
         Indices, with the statements for them; a case without indices is run for every index.
     fused
         Whether multiplications and additions may be fused.
+    repeats
+        Whether some of its loops consist of turns that do not wait for one another.
     """
 
     name: str
     signature: Signature
     cases: Sequence[Any]
-    fused: bool
+    fused: bool = False
+    repeats: bool = False
 
 
 def lower(module: Any, written: Function, calls: Mapping[str, OwnFunction | CaseTable] = NO_CALLS) -> None:
@@ -247,6 +250,9 @@ class _Body:
             self._store_variable(name, index)
             self.block(body)
 
+    def _repeat(self, name: str, count: int, body: Sequence[Any]) -> None:
+        self._for(name, 0, count, 1, body)
+
     def _whole(self, name: str, number: int) -> None:
         self.values[name] = WHOLE(number)
 
@@ -258,6 +264,7 @@ class _Body:
         "do": _do,
         "when": _when,
         "for": _for,
+        "repeat": _repeat,
         "whole": _whole,
         "array": _array,
     }

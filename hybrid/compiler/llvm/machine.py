@@ -16,20 +16,26 @@ from hybrid.compiler.llvm.lowering import NO_CALLS, CaseTable, Function, OwnFunc
 LONG = 15000
 
 
-def _optimise(module: Any) -> None:
-    """Run the passes that generated text profits from.
+def _optimise(module: Any, *, repeats: bool) -> None:
+    """Run the passes that compiled functions profit from.
 
-    Its vectors are written as vectors and nothing is left to inline. So these passes give code as fast as all
-    passes of LLVM's highest level do, in half the time.
+    Their vectors are written as vectors and nothing is left to inline. So a few passes give code as fast as
+    all passes of LLVM's highest level do, in half the time. A loop that ``repeats`` statements is another
+    matter: it becomes vectors.
     """
     options = binding.create_pipeline_tuning_options(speed_level=SPEED)
+    options.loop_vectorization, options.loop_unrolling, options.slp_vectorization = repeats, False, False
+    builder = binding.create_pass_builder(target(), options)
+    if repeats:
+        builder.getModulePassManager().run(module, builder)
+        return
     passes = binding.create_new_module_pass_manager()
     passes.add_sroa_pass()
     passes.add_simplify_cfg_pass()
     passes.add_instruction_combine_pass()
     passes.add_loop_rotate_pass()
     passes.add_new_gvn_pass()
-    passes.run(module, binding.create_pass_builder(target(), options))
+    passes.run(module, builder)
 
 
 @between_passes()
@@ -47,7 +53,7 @@ def machine_code(
         lower(module, written, calls)
     parsed = binding.parse_assembly(str(module))
     parsed.verify()
-    _optimise(parsed)
+    _optimise(parsed, repeats=any(each.repeats for each in functions))
     longest = max(sum(len(block.instructions) for block in each.blocks) for each in module.functions)
     code: bytes = target(HASTE if longest > LONG else SPEED).emit_object(parsed)
     return code

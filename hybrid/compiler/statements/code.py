@@ -20,6 +20,7 @@ A statement is one of these:
 ``("do", term)``                      a call for what it does
 ``("for", name, start, stop, step,    a loop as over Python's ``range``
 body)``
+``("repeat", name, count, body)``      a loop whose turns do not wait for one another
 ``("when", condition, body, other)``  one of two lists of statements
 ``("whole", name, number)``           a name for a whole number
 ``("array", name, size)``             an array of this function; all entries have the type of the first one

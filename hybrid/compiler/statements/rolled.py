@@ -1,20 +1,22 @@
 """Loops for statements that repeat: a chain of four hundred masses is as much code as one mass.
 
-Statements repeat if they differ in numbers and names alone. Those that do not wait for one another become one
-loop; what differs from turn to turn is a multiple of the turn, or comes from a list. Variables that are set in
-such a loop, or that differ from turn to turn, are cells of an array.
+Statements repeat if they differ in numbers and names alone. Those that do not wait for one another become
+one loop; what differs from turn to turn is a multiple of the turn, or comes from a list. Variables that are
+set in such a loop, or that differ from turn to turn, are cells of an array.
 
 Nothing is known of chains, rings or lattices here, and neither is of fields or series.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
 from typing import Any
 
 import attrs
 
-from hybrid.compiler.statements.code import KNOWN, Code, Statement, at, call, get, loop, put
+from hybrid.compiler.statements.code import KNOWN, Code, Statement, at, call, get, put
 from hybrid.kernels.types.codes import NARROW
 
 # A loop with its lists is about as much code as so many statements; fewer stay as they are.
@@ -77,9 +79,20 @@ class _Roller:
         self.kinds: dict[str, int] = {}
         self.cells: dict[str, tuple[int, int]] = {}
         self.has_loops = False
+        self.uses: Counter[str] = Counter()
         for statement in _simple(statements):
+            self._count(statement[1:])
             if statement[0] == "set":
                 self._learn(statement[1], statement[2])
+
+    def _count(self, term: Any) -> None:
+        """Count the uses of variables; where one is set counts too."""
+        if isinstance(term, tuple):
+            if term and term[0] == "get":
+                self.uses[term[1]] += 1
+            else:
+                for part in term:
+                    self._count(part)
 
     def _learn(self, place: Code, term: Any) -> None:
         if place[0] == "get":
@@ -139,7 +152,7 @@ class _Roller:
             return [*statements]
         levels = _Order(self.whole)
         groups: dict[Any, list[tuple[Statement, list[Any]]]] = {}
-        for statement in statements:
+        for statement in self._directly(statements):
             slots: list[Any] = []
             shape = self._shape(statement, slots)
             groups.setdefault((levels.of(statement), shape), []).append((statement, slots))
@@ -154,8 +167,44 @@ class _Roller:
                 continue
             self.has_loops = True
             self._allot_cells(members, slots)
-            plan.append(_Repeated(members, slots))
+            plan += self._runs(members, slots)
         return plan
+
+    def _runs(self, members: Sequence[Statement], slots: Sequence[Sequence[Any]]) -> list[Any]:
+        """Loops without lists for members in which all differs by the same steps; one loop for the others."""
+        places = [[self.cells[x][1] if x in self.cells else x for x in row] for row in slots]
+        steps = [_steps(*pair) for pair in pairwise(places)]
+        plan, rest, begin = list[Any](), list[int](), 0
+        while begin < len(members):
+            end = begin + 1
+            while end < len(members) and None not in steps[begin] and steps[end - 1] == steps[begin]:
+                end += 1
+            if end - begin >= LEAST:
+                plan.append(_Repeated(members[begin:end], slots[begin:end]))
+                begin = end
+            else:
+                rest.append(begin)
+                begin += 1
+        if len(rest) < LEAST:
+            return plan + [members[i] for i in rest]
+        return [*plan, _Repeated([members[i] for i in rest], [slots[i] for i in rest])]
+
+    def _directly(self, statements: Sequence[Statement]) -> list[Statement]:
+        """Statements that write a result at once, not by a variable that nothing else reads."""
+        found = dict[int, Statement](enumerate(statements))
+        written_at: dict[str, int] = {}
+        for place, (kind, *parts) in enumerate(statements):
+            if kind != "set":
+                continue
+            target, value = parts
+            if target[0] == "get":
+                written_at[target[1]] = place
+            elif type(value) is Code and value[0] == "get" and self.uses[value[1]] == 2:
+                earlier = written_at.get(value[1])
+                if earlier is not None:
+                    found[earlier] = put(target, found[earlier][2])
+                    del found[place]
+        return [*found.values()]
 
     def _shape(self, term: Any, slots: list[Any]) -> Any:
         """A statement or a term without its numbers and variables, which are appended to ``slots``."""
@@ -225,7 +274,7 @@ class _Roller:
     def _loop(self, group: _Repeated) -> Statement:
         columns = iter([self._varying(column) for column in zip(*group.slots, strict=True)])
         body = self._filled(group.statements[0], columns)
-        return loop(TURN[1], 0, len(group.statements), [body])
+        return ("repeat", TURN[1], len(group.statements), (body,))
 
     def _filled(self, term: Any, columns: Iterator[Any]) -> Any:
         """The first statement of a group, with what varies in the place of its numbers and variables."""
@@ -255,6 +304,12 @@ class _Roller:
             scaled = TURN if stride == 1 else TURN * stride
             return scaled + first if first else scaled
         return call("listed", tuple(column), TURN)
+
+
+def _steps(before: Sequence[Any], after: Sequence[Any]) -> list[Any]:
+    """By how much whole numbers differ; 0 for what is equal, None for what is not."""
+    pairs = zip(before, after, strict=True)
+    return [b - a if type(a) is int else 0 if a == b else None for a, b in pairs]
 
 
 def _is_straight(statement: Statement) -> bool:
@@ -347,8 +402,7 @@ class _Order:
     def _cell(self, array: str, place: Sequence[Any]) -> Any:
         """A key for an entry: array, row if it is a number, and column."""
         if len(place) == 1:
-            # The state may be overwritten by the result.
-            return "x" if array == "out" else array, 0, self._column(place[0])
+            return array, 0, self._column(place[0])
         row, column = place
         return array, row if type(row) is int else None, self._column(column)
 

@@ -144,7 +144,8 @@ def write_spread(builder, y, length, n, rows, first, stride):
             source = builder.select(is_one, builder.mul(number(n), builder.add(vector, number(1))), number(0))
             start = builder.gep(y, [source], source_etype=NUMBER)
             target = rows.address(number(0), column)
-            for i in range(n):
-                value = builder.load(builder.gep(start, [number(i)], source_etype=NUMBER), typ=NUMBER)
+            with loop(builder, number(0), number(n), number(1)) as i:
+                value = builder.load(builder.gep(start, [i], source_etype=NUMBER), typ=NUMBER)
                 value = builder.select(is_one, value, value.type(0.0))
-                builder.store(value, rows.beside(target, NARROW * i))
+                place = builder.gep(target, [builder.mul(i, number(NARROW))], source_etype=NUMBER)
+                builder.store(value, place)
