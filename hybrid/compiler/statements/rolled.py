@@ -45,8 +45,7 @@ def rolled(statements: Sequence[Statement]) -> Sequence[Statement]:
     plan = roller.planned(statements)
     if not roller.cells and not roller.has_loops:
         return statements
-    sizes = [sum(kind == each for kind, _ in roller.cells.values()) for each in CELLS]
-    arrays = [("array", name, size) for name, size in zip(CELLS.values(), sizes, strict=True) if size]
+    arrays = [("array", name, roller.sizes[kind]) for kind, name in CELLS.items() if roller.sizes[kind]]
     return [*arrays, *roller.written(plan)]
 
 
@@ -78,6 +77,7 @@ class _Roller:
         # The kinds of variables, and the place of each cell.
         self.kinds: dict[str, int] = {}
         self.cells: dict[str, tuple[int, int]] = {}
+        self.sizes: Counter[int] = Counter()
         self.has_loops = False
         self.uses: Counter[str] = Counter()
         for statement in _simple(statements):
@@ -241,7 +241,8 @@ class _Roller:
     def _allot(self, name: str) -> None:
         kind = self.kinds[name]
         if name not in self.cells:
-            self.cells[name] = kind, sum(other == kind for other, _ in self.cells.values())
+            self.cells[name] = kind, self.sizes[kind]
+            self.sizes[kind] += 1
 
     # The statements.
 
