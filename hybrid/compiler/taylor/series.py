@@ -15,6 +15,7 @@ from typing import Any
 from hybrid.compiler.statements.code import Code, Statement, at, call, do, either, equal, get, put
 from hybrid.compiler.statements.values import Constants, root_power
 from hybrid.compiler.taylor.sums import Term, added
+from hybrid.expression import operations as ops
 from hybrid.expression.derivatives import derivative
 from hybrid.expression.graph import (
     Group,
@@ -26,33 +27,26 @@ from hybrid.expression.graph import (
     terms_of,
 )
 from hybrid.expression.nodes import ONE, TWO, ZERO, Expression, Symbol, add, multiply, number, power
-from hybrid.expression.operations import (
-    Arccos,
-    Arccosh,
-    Arcsin,
-    Arcsinh,
-    Arctan,
-    Arctanh,
-    Cos,
-    Cosh,
-    Exp,
-    Expm1,
-    Level,
-    Log,
-    Log1p,
-    Sin,
-    Sinh,
-    Tan,
-    Tanh,
-)
 from hybrid.kernels.types.codes import NARROW
 
 # Functions whose derivatives consist of operations with recurrences.
-BY_DERIVATIVE = (Log, Log1p, Expm1, Arcsin, Arccos, Arctan, Arcsinh, Arccosh, Arctanh)
+BY_DERIVATIVE = (
+    ops.Log,
+    ops.Log1p,
+    ops.Expm1,
+    ops.Arcsin,
+    ops.Arccos,
+    ops.Arctan,
+    ops.Arcsinh,
+    ops.Arccosh,
+    ops.Arctanh,
+)
 # A pair of functions, and the sign in the derivative of the second: cos' = -sin, cosh' = sinh.
-PAIRS = dict.fromkeys((Sin, Cos), (Sin, Cos, -1.0)) | dict.fromkeys((Sinh, Cosh), (Sinh, Cosh, 1.0))
+PAIRS = dict.fromkeys((ops.Sin, ops.Cos), (ops.Sin, ops.Cos, -1.0)) | dict.fromkeys(
+    (ops.Sinh, ops.Cosh), (ops.Sinh, ops.Cosh, 1.0)
+)
 # ``y' = (1 -+ y^2) u'``.
-OWN_SQUARE = {Tanh: -1, Tan: 1}
+OWN_SQUARE = {ops.Tanh: -1, ops.Tan: 1}
 # Longer inner sums are not expanded: other expressions may need them too.
 MOST_TERMS = 4
 # The order of a coefficient, the matrix of all coefficients, and the reciprocal of the order.
@@ -278,7 +272,7 @@ class Recurrences:
             return self._product(expression)
         if expression.is_power:
             return self._power(expression)
-        if isinstance(expression, Exp):
+        if isinstance(expression, ops.Exp):
             return self._exponential(expression, expression.args[0])
         if type(expression) in PAIRS:
             return self._pair(expression)
@@ -289,7 +283,7 @@ class Recurrences:
             return self._bind(expression, value, value)
         if isinstance(expression, BY_DERIVATIVE):
             return self._by_derivative(expression)
-        if isinstance(expression, Level):
+        if isinstance(expression, ops.Level):
             return self._bind(expression, call("np.floor", self.coefficient(*expression.args)), 0.0)
         raise NoSeries(f"{expression.word} is not analytic")
 
@@ -402,7 +396,7 @@ class Recurrences:
     def _power(self, expression: Expression) -> Code:
         base, exponent = expression.args
         if not self._is_constant(exponent):
-            value = self.coefficient(Exp(exponent * Log(base)))
+            value = self.coefficient(ops.Exp(exponent * ops.Log(base)))
             return self._bind(expression, value, value)
         if is_whole(exponent) and is_negative(exponent):
             return self._quotient(expression, None, power(base, -exponent))
