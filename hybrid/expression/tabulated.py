@@ -51,7 +51,11 @@ class Tabulated(RealFunction):
         return closed(*self.pieces.ends(self.derived))
 
     def slope(self, place: int = 0) -> Expression:
-        found: Expression = Tabulated(self.args[0], self.pieces, self.derived + 1)
+        return self.differentiated(1)
+
+    def differentiated(self, times: int) -> Expression:
+        """A derivative of its pieces, of a further order."""
+        found: Expression = Tabulated(self.args[0], self.pieces, self.derived + times)
         return found
 
     @property
@@ -79,6 +83,11 @@ def has_knots_in_time(node: Expression) -> bool:
         return False
     time = Symbol("t")
     return repeat_of(node) is not None or degree_of(argument, frozenset((time,))) == 1
+
+
+def tables_of_time(*expressions: Expression) -> set[Tabulated]:
+    """The tables whose knots end steps: within a step they are polynomials of time."""
+    return {node for node in nodes_of(Tabulated, *expressions) if has_knots_in_time(node)}
 
 
 def repeat_of(node: Tabulated) -> Expression | None:

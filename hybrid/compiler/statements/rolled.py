@@ -114,6 +114,8 @@ class _Roller:
             return TRUTH
         if operation in ("at", "item", "if", "listed"):
             return NUMBER
+        if operation == "rounded":
+            return self._kind(parts[0])
         if operation in IN_WHOLE_NUMBERS or operation in ("/", "neg"):
             kinds = {self._kind(part) for part in parts}
             if LANES in kinds:
