@@ -124,6 +124,44 @@ def test_a_force_as_a_table_keeps_the_energy(solver):
     assert energy(*arc.x[-1]) == pytest.approx(energy(1.5, 0.0), rel=1e-7)
 
 
+@pytest.mark.parametrize("kind", ["step", "linear", "cubic"])
+@pytest.mark.parametrize(
+    ("field", "reason"),
+    [
+        (lambda t, x, p, force: (x.v, force(t) + 0.3), "exact (polynomials of degree"),
+        (
+            lambda t, x, p, force: (x.v, 2.0 * force(0.7 * t + 0.3) - 4.0 * x.q - 0.1 * x.v),
+            "exact (affine in",
+        ),
+        (lambda t, x, p, force: (x.v, force(t % 1.7) - x.q), "exact (affine in"),
+        (lambda t, x, p, force: (x.v, force(t) * x.v - np.sin(x.q)), "Taylor series"),
+    ],
+)
+def test_tables_of_time_have_series(kind, field, reason):
+    times = np.array([0.2, 0.5, 0.6, 1.1, 1.9, 2.2, 3.0])
+    force = Table(times, np.array([0.3, -1.0, 0.4, 0.8, -0.2, 0.5, 1.2]), kind=kind)
+    system = HybridSystem(
+        state=("q", "v"), modes=[Mode("swing", lambda t, x, p: field(t, x, p, force))], name="swing"
+    )
+    assert reason in str(compile_system(system))
+    arc = simulate(system, (0.4, -0.1), (0.0, 3.5), tangent=True)
+    beside = simulate(system, (0.4, -0.1), (0.0, 3.5), tangent=True, solver=Tsit5(rtol=1e-12, atol=1e-13))
+    np.testing.assert_allclose(arc.x[-1], beside.x[-1], atol=1e-9)
+    np.testing.assert_allclose(arc.fundamental, beside.fundamental, atol=1e-8)
+
+
+def test_an_oscillator_under_a_staircase_is_exact():
+    """Each stair is an arc of a circle in the phase plane."""
+    times, stairs = np.arange(0.0, 10.0, 0.5), np.random.default_rng(3).normal(size=20)
+    force = Table(times, stairs, kind="step")
+    system = HybridSystem(state=("q", "v"), modes=[Mode("swing", lambda t, x, p: (x.v, force(t) - x.q))])
+    z = 1.0 + 0.0j
+    for stair in stairs:
+        z = stair + (z - stair) * np.exp(-0.5j)
+    arc = simulate(system, (1.0, 0.0), (0.0, 10.0))
+    np.testing.assert_allclose(arc.x[-1], [z.real, z.imag], atol=1e-14)
+
+
 def test_guards_read_tables():
     charge = np.linspace(0.0, 1.0, 11)
     voltage = Table(charge, 3.0 + charge**2)
