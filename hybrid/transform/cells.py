@@ -262,6 +262,13 @@ class Pieces:
             self._between[key] = SwitchingSurface(self.variables, below, above, height)
         return self._between[key]
 
+    def beside(self, sides: Sides, number: int) -> SwitchingSurface:
+        """A surface with the flows on either side of it in a cell where the state slides on no other one.
+
+        What a flow along several surfaces does across them is zero up to rounding, and tells no size.
+        """
+        return self.between(next(_vertices(sides, besides=number)), number)
+
     def jumps(self, sides: Sides, number: int) -> bool:
         """Whether the field is not proved to be continuous across a surface, all other sides as given."""
         height = self.surfaces.known[number].height

@@ -326,13 +326,14 @@ class Splitter:
         pieces, source, sides = self.pieces[cell.mode], self.name_of(cell), dict(cell.branches)
         surface = pieces.between(sides, number)
         height = self._height(number)
+        is_off = self._condition(pieces.beside(sides, number).is_off)
         ways = [
             (side, choice.cell, self._on(choice.chosen))
             for side in (1, -1)
             for choice in pieces.choices({**dict(cell.sides), number: 2 * side})
         ]
         for side, target, extra in ways:
-            off = Guard(height, side, when=_all([self._condition(surface.is_off), *extra]), at_start=True)
+            off = Guard(height, side, when=_all([is_off, *extra]), at_start=True)
             yield self._edge(cell, target, off)
         if pieces.rests(sides, number):
             return

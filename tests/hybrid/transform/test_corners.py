@@ -190,3 +190,25 @@ def test_surfaces_without_a_jump_hold_no_orbit(field, along_both):
     pieces, _ = pieces_of(field)
     x, y = numbers(pieces)
     assert may_slide(pieces, {x: 0, y: 0}) == along_both
+
+
+def test_a_start_off_three_surfaces_is_in_one_mode():
+    """The flow along all three of them is zero up to rounding, which tells nothing of what is near."""
+
+    def field(t, x, p):
+        parts = (
+            (getattr(p, f"b{i}{j}") * np.sign(x[j] - getattr(p, f"c{j}")) for j in range(3)) for i in range(3)
+        )
+        return [getattr(p, f"a{i}") - sum(each) for i, each in enumerate(parts)]
+
+    names = [*(f"a{i}" for i in range(3)), *(f"c{i}" for i in range(3))]
+    names += [f"b{i}{j}" for i in range(3) for j in range(3)]
+    system = from_equations(field, state=3, parameters=dict.fromkeys(names, 1.0))
+    rng = np.random.default_rng(0)
+    for _ in range(4):
+        values = dict(zip(names, rng.normal(size=len(names)), strict=True))
+        values |= {f"b{i}{i}": 2.0 + abs(values[f"b{i}{i}"]) for i in range(3)}
+        x0 = rng.normal(size=3)
+        arc = simulate(system, x0, (0.0, 0.1), parameters=values)
+        sides = ["<" if x0[i] < values[f"c{i}"] else ">" for i in range(3)]
+        assert arc.mode[0] == ", ".join(f"x{i}{side}c{i}" for i, side in enumerate(sides))
