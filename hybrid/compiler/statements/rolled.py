@@ -21,7 +21,7 @@ from hybrid.kernels.types.codes import NARROW
 
 # A loop with its lists is about as much code as so many statements; fewer stay as they are.
 LEAST = 12
-NUMBER, LANES, WHOLE, TRUTH = range(4)
+NUMBER, LANES, WHOLE, TRUTH, RESULT = range(5)
 # The array of all cells of a kind.
 CELLS = {NUMBER: "numbers", LANES: "lanes"}
 TURN = get("turn")
@@ -80,17 +80,19 @@ class _Roller:
         self.cells: dict[str, tuple[int, int]] = {}
         self.has_loops = False
         self.uses: Counter[str] = Counter()
+        self._count((*statements,))
         for statement in _simple(statements):
-            self._count(statement[1:])
             if statement[0] == "set":
                 self._learn(statement[1], statement[2])
 
     def _count(self, term: Any) -> None:
-        """Count the uses of variables; where one is set counts too."""
+        """Count the uses of variables; where one is set counts too. What items are taken of is a result."""
         if isinstance(term, tuple):
-            if term and term[0] == "get":
+            if term[:1] == ("get",):
                 self.uses[term[1]] += 1
             else:
+                if term[:1] == ("item",):
+                    self.kinds[term[1][1]] = RESULT
                 for part in term:
                     self._count(part)
 
@@ -98,7 +100,9 @@ class _Roller:
         if place[0] == "get":
             self.kinds.setdefault(place[1], self._kind(term))
         elif place[0] == "several":
-            self.kinds |= dict.fromkeys((each[1] for each in place[1:]), self._kind(term))
+            terms = term[1:] if term[0] == "several" else [term] * len(place[1:])
+            for each, part in zip(place[1:], terms, strict=True):
+                self._learn(each, part)
 
     def _kind(self, term: Any) -> int:
         """What a term is: a number, four numbers, a whole number or a truth value."""
@@ -150,12 +154,11 @@ class _Roller:
     def _grouped(self, statements: list[Statement]) -> list[Any]:
         if len(statements) < LEAST:
             return [*statements]
-        levels = _Order(self.whole)
         groups: dict[Any, list[tuple[Statement, list[Any]]]] = {}
-        for statement in self._directly(statements):
+        for level, statement in self._levels(statements):
             slots: list[Any] = []
             shape = self._shape(statement, slots)
-            groups.setdefault((levels.of(statement), shape), []).append((statement, slots))
+            groups.setdefault((level, shape), []).append((statement, slots))
         if max(map(len, groups.values())) < LEAST:
             return [*statements]
         plan = list[Any]()
@@ -189,29 +192,39 @@ class _Roller:
             return plan + [members[i] for i in rest]
         return [*plan, _Repeated([members[i] for i in rest], [slots[i] for i in rest])]
 
-    def _directly(self, statements: Sequence[Statement]) -> list[Statement]:
-        """Statements that write a result at once, not by a variable that nothing else reads."""
-        found = dict[int, Statement](enumerate(statements))
-        written_at: dict[str, int] = {}
-        for place, (kind, *parts) in enumerate(statements):
-            if kind != "set":
-                continue
-            target, value = parts
-            if target[0] == "get":
-                written_at[target[1]] = place
-            elif type(value) is Code and value[0] == "get" and self.uses[value[1]] == 2:
-                earlier = written_at.get(value[1])
-                if earlier is not None:
-                    found[earlier] = put(target, found[earlier][2])
-                    del found[place]
-        return [*found.values()]
+    def _levels(self, statements: Sequence[Statement]) -> list[tuple[int, Statement]]:
+        """Statements with their levels; a result is not first given to a variable that nothing else reads."""
+        order = _Order(self.whole)
+        found = list[tuple[int, Statement]]()
+        set_at: dict[str, int] = {}
+        for statement in statements:
+            name = self._only_stored(statement)
+            if name in set_at:
+                level, earlier = found[set_at[name]]
+                if order.of(put(statement[1], 0.0)) <= level:
+                    found[set_at[name]] = level, put(statement[1], earlier[2])
+                    order.of(statement)
+                    continue
+            if statement[0] == "set" and statement[1][0] == "get":
+                set_at[statement[1][1]] = len(found)
+            found.append((order.of(statement), statement))
+        return found
+
+    def _only_stored(self, statement: Statement) -> str | None:
+        """The variable that a statement writes to an array, if nothing else reads the variable."""
+        if statement[0] == "do" or statement[1][0] == "get":
+            return None
+        value = statement[2]
+        is_name = isinstance(value, tuple) and value[0] == "get" and self.uses[value[1]] == 2
+        return value[1] if is_name else None
 
     def _shape(self, term: Any, slots: list[Any]) -> Any:
         """A statement or a term without its numbers and variables, which are appended to ``slots``."""
         kind = type(term)
         if kind is int or kind is float:
             slots.append(term)
-            return kind
+            # A negative zero equals zero, but is another number.
+            return "-0.0" if str(term) == "-0.0" else kind
         if kind is str:
             return term
         if term[0] == "get":
@@ -347,18 +360,17 @@ class _Order:
         reads, writes = list[Any](), list[Any]()
         if statement[0] == "do":
             _, array, *place, value = statement[1]
-            writes.append(self._cell(array[1], place))
-            self._find(value, reads)
+            target = at(array[1], *place)
         else:
-            target, value = statement[1], statement[2]
-            self._find(value, reads)
-            for each in target[1:] if target[0] == "several" else [target]:
-                if each[0] == "at":
-                    writes.append(self._cell(each[1], each[2:]))
-                    for index in each[2:]:
-                        self._find(index, reads)
-                else:
-                    writes.append(each[1])
+            _, target, value = statement
+        self._find(value, reads)
+        for each in target[1:] if target[0] == "several" else [target]:
+            if each[0] == "at":
+                writes.append(self._cell(each[1], each[2:]))
+                for index in each[2:]:
+                    self._find(index, reads)
+            else:
+                writes.append(each[1])
         level = 0
         for key in reads:
             level = max(level, self._latest(self.write, key))
@@ -386,16 +398,13 @@ class _Order:
         operation, *parts = term
         if operation == "get":
             found.append(parts[0])
-        elif operation == "at":
-            found.append(self._cell(parts[0], parts[1:]))
-            for index in parts[1:]:
+        elif operation in ("at", "load"):
+            array, *place = parts
+            found.append(self._cell(array if operation == "at" else array[1], place))
+            for index in place:
                 self._find(index, found)
-        elif operation == "load":
-            found.append(self._cell(parts[0][1], parts[1:]))
-        elif operation == "convolved":
-            # It reads orders that are complete: nothing that statements beside it write.
-            return
         else:
+            # A convolution reads orders that are complete: nothing that statements beside it write.
             for part in parts:
                 self._find(part, found)
 
@@ -414,7 +423,7 @@ class _Order:
             return ((), self.whole[term[1]]) if term[1] in self.whole else ((term[1],), 0)
         if term[0] == "+":
             (one, first), (other, second) = map(self._column, term[1:])
-            return one + other, first + second
+            return tuple(sorted(one + other, key=str)), first + second
         return (term,), 0
 
 
