@@ -214,13 +214,13 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
             reset.expressions is None or bool(jumps_of(reset.expressions, (symbols.t, *symbols.x)))
             for reset in resets
         ),
-        propagators=tuple(map(_without_text, propagators)),
+        propagators=tuple(map(_without_code, propagators)),
         tangent_start=places.vectors,
     )
 
 
-def _without_text(propagator: Propagator) -> Propagator:
-    """The propagator without the statements, which are in the texts of the model."""
+def _without_code(propagator: Propagator) -> Propagator:
+    """The propagator without its statements, which are in the texts of the model."""
     series = attrs.evolve(propagator.series, statements=(), tangent_statements=())
     return attrs.evolve(propagator, series=series)
 

@@ -171,7 +171,7 @@ class Emitted:
     tables
         The numbers of all tables, as text (``hybrid.compiler.tables``).
     opaque
-        The model functions that tracing could not follow, by their names in the text; not stored.
+        The model functions that tracing could not follow, by their names in the code; not stored.
     """
 
     texts: dict[str, str]

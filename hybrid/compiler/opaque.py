@@ -20,7 +20,7 @@ from hybrid.system.labels import plain_name
 from hybrid.system.variables import PARAMETERS, STATE, plain_class
 
 LONGEST_REASON = 300
-# In generated text, behind the name of a function: its derivative along one of the variables.
+# In code, behind the name of a function: its derivative along one of the variables.
 SLOPES = "_slopes"
 
 
@@ -28,7 +28,7 @@ SLOPES = "_slopes"
 class OpaqueFunction:
     """A model function that is compiled as it is.
 
-    Generated text calls it by a name: ``r = model_0(t, x, p)`` gives all its numbers in one row, and
+    Code calls it by a name: ``r = model_0(t, x, p)`` gives all its numbers in one row, and
     ``r = model_0_slopes(t, x, p, j)`` their derivatives along state ``j``, or along time for ``j = n``.
 
     Attributes
@@ -85,7 +85,7 @@ def check_plain(title: str, function: Callable[..., Any]) -> None:
 
 
 def compiled_functions(name: str, opaque: OpaqueFunction) -> dict[str, Any]:
-    """A function and its derivative, compiled, by their names in generated text; they never raise.
+    """A function and its derivative, compiled, by their names in code; they never raise.
 
     They fill their last argument, with nan if the function raises an error, which nobody could be told.
 

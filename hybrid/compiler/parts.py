@@ -1,4 +1,4 @@
-"""From generated text to machine code, without numba's inference of types."""
+"""The parts in which the functions of a model are compiled, each when a run first needs it."""
 
 # The functions of a model, each with the index of a mode or of a transition first, in parts. A part is
 # compiled when a run first needs it; every run needs fields and events. Systems that differ in their guards

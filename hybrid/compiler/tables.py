@@ -45,7 +45,7 @@ class Tables:
         return self.places[pieces]
 
     def located(self, text: str) -> str:
-        """Generated text with the places of tables for their names."""
+        """The text of code with the places of tables for their names."""
         return NAME.sub(lambda found: str(self.place(Pieces.known[found[1]])), text)
 
     def packed(self) -> str:

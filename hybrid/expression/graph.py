@@ -154,14 +154,13 @@ def contains(expression: Expression, kinds: type[Function] | tuple[type[Function
 def degree_of(expression: Expression, variables: frozenset[Symbol]) -> int | None:
     """Degree as a polynomial in the variables, without cancellation; None if it is not a polynomial."""
     found: dict[Expression, int | None] = {}
+    group = Group(variables)
     for each in in_order([expression]):
-        found[each] = _degree(each, found, variables)
+        found[each] = _degree(each, found, group)
     return found[expression]
 
 
-def _degree(
-    node: Expression, found: Mapping[Expression, int | None], variables: frozenset[Symbol]
-) -> int | None:
+def _degree(node: Expression, found: Mapping[Expression, int | None], variables: Group) -> int | None:
     if not mentions(node, variables):
         return 0
     if node.is_symbol:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import attrs
 import numpy as np
 
 from hybrid.expression.graph import is_larger_than, once
@@ -24,49 +25,69 @@ def follows(height: Expression, side: int, given: Sequence[tuple[Expression, int
     count as variables of their own.
     """
     target = _monomials(height)
-    columns, strict = [{ONE: 1.0}], [True]
-    for other, on in given:
-        row = _monomials(other)
-        if row is None:
-            continue
-        signs = (1.0, -1.0) if on in (0, -2, 2) else (float(on),)
-        columns += [{name: sign * factor for name, factor in row.items()} for sign in signs]
-        strict += [on in (-1, 1)] * len(signs)
+    columns = [
+        Column({name: (on if on in (-1, 1) else 1) * factor for name, factor in row.items()}, on in (-1, 1))
+        for other, on in given
+        if (row := _monomials(other)) is not None
+    ]
     if target is None:
         return False
     wanted = {name: side * factor for name, factor in target.items()}
-    kept = _of_use(wanted, columns)
+    kept = _of_use(wanted, [Column({ONE: 1.0}, True), *columns])
     if not kept:
         return False
-    # SciPy's optimisers take half a second to import.
-    from scipy.optimize import nnls
-
-    names = [*{name for i in kept for name in columns[i]}]
-    matrix = np.array([[columns[i].get(name, 0.0) for i in kept] for name in names])
-    factors, distance = nnls(matrix, np.array([wanted.get(name, 0.0) for name in names]))
-    scale = max(map(abs, wanted.values()))
-    strictly = factors[[strict[i] for i in kept]]
-    return bool(distance <= ROUNDING * scale and np.any(strictly > ROUNDING * scale))
+    names = [*{name for column in kept for name in column.terms}]
+    matrix = np.array([[column.terms.get(name, 0.0) for column in kept] for name in names])
+    factors = _combination(matrix, np.array([wanted.get(name, 0.0) for name in names]), kept)
+    least = ROUNDING * max(map(abs, wanted.values()))
+    distance = matrix @ factors - [wanted.get(name, 0.0) for name in names]
+    signed = factors[[column.is_signed for column in kept]]
+    return bool(np.linalg.norm(distance) <= least and np.all(signed >= -least) and np.any(signed > least))
 
 
-def _of_use(wanted: Mapping[Expression, float], columns: Sequence[Mapping[Expression, float]]) -> list[int]:
-    """The columns that a combination with positive factors may have; none if there is no combination.
+@attrs.frozen
+class Column:
+    """What may be added to a combination: terms by monomial; if it is signed, with a positive factor only."""
+
+    terms: Mapping[Expression, float]
+    is_signed: bool
+
+
+def _of_use(wanted: Mapping[Expression, float], columns: Sequence[Column]) -> Sequence[Column]:
+    """The columns that a combination may have; none if there is no combination.
 
     A monomial that is not wanted must cancel, and one that is wanted must come from somewhere.
     """
-    kept = [*range(len(columns))]
     while True:
         signs: dict[Expression, set[bool]] = {}
-        for i in kept:
-            for name, factor in columns[i].items():
-                signs.setdefault(name, set()).add(factor > 0.0)
+        for column in columns:
+            for name, factor in column.terms.items():
+                signs.setdefault(name, set()).update((factor > 0.0, (factor > 0.0) == column.is_signed))
         if any((factor > 0.0) not in signs.get(name, ()) for name, factor in wanted.items()):
             return []
         alone = {name for name, found in signs.items() if len(found) == 1 and name not in wanted}
-        left = [i for i in kept if alone.isdisjoint(columns[i])]
-        if len(left) == len(kept):
-            return kept
-        kept = left
+        left = [column for column in columns if alone.isdisjoint(column.terms)]
+        if len(left) == len(columns):
+            return columns
+        columns = left
+
+
+def _combination(matrix: np.ndarray, wanted: np.ndarray, columns: Sequence[Column]) -> np.ndarray:
+    """The factors of columns that come closest to what is wanted, negative ones only if there are no others.
+
+    Independent columns have but one combination.
+    """
+    factors: np.ndarray
+    factors, _, rank, _ = np.linalg.lstsq(matrix, wanted)
+    if rank == len(columns):
+        return factors
+    # SciPy's optimisers take half a second to import.
+    from scipy.optimize import nnls
+
+    free = [i for i, column in enumerate(columns) if not column.is_signed]
+    factors, _ = nnls(np.hstack([matrix, -matrix[:, free]]), wanted)
+    factors[free] -= factors[len(columns) :]
+    return factors[: len(columns)]
 
 
 @once

@@ -102,6 +102,7 @@ class Expression:
         bounds: ClassVar[Any]
         range: ClassVar[Any]
         in_other_terms: ClassVar[Any]
+        by_derivative: ClassVar[bool]
 
         def slope(self, place: int = 0) -> Any: ...
         def __float__(self) -> float: ...

@@ -2,7 +2,8 @@
 
 ``numpy`` is its value, ``code`` its name in generated code, ``word`` that in texts, ``bounds`` its number in
 interval programs. ``slopes`` are its derivatives in its arguments, ``range`` holds its values, and ``parity``
-says whether it is even (1) or odd (-1). ``in_other_terms`` expresses it by functions with series.
+says whether it is even (1) or odd (-1). ``in_other_terms`` expresses it by functions with series; with
+``by_derivative`` its series is the integral of its slope's.
 """
 
 # ruff: noqa: D102 - methods that override others are explained there
@@ -52,6 +53,7 @@ class RealFunction(Function):
     range: ClassVar[Any] = staticmethod(lambda *parts: ANYTHING)
     slopes: ClassVar[tuple[Callable[..., Expression], ...]] = ()
     in_other_terms: ClassVar[Any] = None
+    by_derivative: ClassVar[bool] = False
 
     @classmethod
     def simplified(cls, *args: Expression) -> Expression | None:
@@ -98,7 +100,7 @@ class Exp(RealFunction):
 class Expm1(RealFunction):
     """``e**u - 1``."""
 
-    numpy, code, bounds = np.expm1, "expm1", op.EXPM1
+    numpy, code, bounds, by_derivative = np.expm1, "expm1", op.EXPM1, True
     slopes = (lambda u: Exp(u),)
 
 
@@ -113,14 +115,14 @@ class Exp2(RealFunction):
 class Log(RealFunction):
     """The natural logarithm."""
 
-    numpy, code, bounds = np.log, "log", op.LOG
+    numpy, code, bounds, by_derivative = np.log, "log", op.LOG, True
     slopes = (lambda u: 1 / u,)
 
 
 class Log1p(RealFunction):
     """``log(1 + u)``."""
 
-    numpy, code, bounds = np.log1p, "log1p", op.LOG1P
+    numpy, code, bounds, by_derivative = np.log1p, "log1p", op.LOG1P, True
     slopes = (lambda u: 1 / (1 + u),)
 
 
@@ -166,7 +168,7 @@ class Tan(RealFunction):
 class Arcsin(RealFunction):
     """The arc sine."""
 
-    numpy, code, bounds = np.arcsin, "asin", op.ASIN
+    numpy, code, bounds, by_derivative = np.arcsin, "asin", op.ASIN, True
     parity, range = -1, _always(closed(-2.0, 2.0))
     slopes = (lambda u: 1 / sqrt(1 - power(u, TWO)),)
 
@@ -174,7 +176,7 @@ class Arcsin(RealFunction):
 class Arccos(RealFunction):
     """The arc cosine."""
 
-    numpy, code, bounds = np.arccos, "acos", op.ACOS
+    numpy, code, bounds, by_derivative = np.arccos, "acos", op.ACOS, True
     range = _always(closed(0.0, 4.0))
     slopes = (lambda u: -1 / sqrt(1 - power(u, TWO)),)
 
@@ -182,7 +184,7 @@ class Arccos(RealFunction):
 class Arctan(RealFunction):
     """The arc tangent."""
 
-    numpy, code, bounds = np.arctan, "atan", op.ATAN
+    numpy, code, bounds, by_derivative = np.arctan, "atan", op.ATAN, True
     parity, range = -1, _always(closed(-2.0, 2.0))
     slopes = (lambda u: 1 / (1 + power(u, TWO)),)
 
@@ -213,14 +215,14 @@ class Tanh(RealFunction):
 class Arcsinh(RealFunction):
     """The inverse of the hyperbolic sine."""
 
-    numpy, code, bounds, parity = np.arcsinh, "asinh", op.ASINH, -1
+    numpy, code, bounds, parity, by_derivative = np.arcsinh, "asinh", op.ASINH, -1, True
     slopes = (lambda u: 1 / sqrt(power(u, TWO) + 1),)
 
 
 class Arccosh(RealFunction):
     """The inverse of the hyperbolic cosine."""
 
-    numpy, code, bounds = np.arccosh, "acosh", op.ACOSH
+    numpy, code, bounds, by_derivative = np.arccosh, "acosh", op.ACOSH, True
     range = _always(NOT_NEGATIVE)
     slopes = (lambda u: 1 / (sqrt(u - 1) * sqrt(u + 1)),)
 
@@ -228,7 +230,7 @@ class Arccosh(RealFunction):
 class Arctanh(RealFunction):
     """The inverse of the hyperbolic tangent."""
 
-    numpy, code, bounds, parity = np.arctanh, "atanh", op.ATANH, -1
+    numpy, code, bounds, parity, by_derivative = np.arctanh, "atanh", op.ATANH, -1, True
     slopes = (lambda u: 1 / (1 - power(u, TWO)),)
 
 

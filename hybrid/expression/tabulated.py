@@ -7,10 +7,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from hybrid.errors import ModelError
-from hybrid.expression.graph import Group, degree_of, mentions, nodes_of, symbols_of
-from hybrid.expression.nodes import ZERO, Expression, Symbol, _kept, number
-from hybrid.expression.operations import RealFunction, Remainder
+from hybrid.expression.graph import Group, all_replaced, degree_of, mentions, nodes_of, symbols_of
+from hybrid.expression.nodes import ZERO, Expression, Symbol, _kept, add, number
+from hybrid.expression.operations import Less, RealFunction, Remainder, Select
 from hybrid.expression.pieces import Pieces
 from hybrid.expression.ranges import Range, closed
 from hybrid.expression.values import looked_up
@@ -52,7 +51,11 @@ class Tabulated(RealFunction):
         return closed(*self.pieces.ends(self.derived))
 
     def slope(self, place: int = 0) -> Expression:
-        found: Expression = Tabulated(self.args[0], self.pieces, self.derived + 1)
+        return self.differentiated(1)
+
+    def differentiated(self, times: int) -> Expression:
+        """A derivative of its pieces, of a further order."""
+        found: Expression = Tabulated(self.args[0], self.pieces, self.derived + times)
         return found
 
     @property
@@ -82,6 +85,11 @@ def has_knots_in_time(node: Expression) -> bool:
     return repeat_of(node) is not None or degree_of(argument, frozenset((time,))) == 1
 
 
+def tables_of_time(*expressions: Expression) -> set[Tabulated]:
+    """The tables whose knots end steps: within a step they are polynomials of time."""
+    return {node for node in nodes_of(Tabulated, *expressions) if has_knots_in_time(node)}
+
+
 def repeat_of(node: Tabulated) -> Expression | None:
     """``T`` of a table of ``t % T``; None for other tables."""
     argument, time = node.args[0], Symbol("t")
@@ -90,12 +98,24 @@ def repeat_of(node: Tabulated) -> Expression | None:
     return None
 
 
-def check_tables(what: str, expressions: Iterable[Expression], states: Iterable[Symbol]) -> None:
-    """ModelError if a table jumps in the state: its jumps are not taken apart."""
-    symbols = Group(states)
-    for table in nodes_of(Tabulated, *expressions):
-        if table.jumps and mentions(table, symbols):
-            raise ModelError(
-                f"{what} has a table of {len(table.pieces.knots)} points that jumps in the state, which is "
-                "not made into modes. Use kind='linear', or np.where for a few jumps."
-            )
+def in_branches(expressions: Iterable[Expression], states: Iterable[Symbol]) -> list[Expression]:
+    """The same expressions with choices between pieces for the tables that jump in the state.
+
+    The choices halve the knots, so that each piece is behind few of them.
+    """
+    group, expressions = Group(states), [*expressions]
+    jumping = [each for each in nodes_of(Tabulated, *expressions) if each.jumps and mentions(each, group)]
+    return all_replaced(expressions, {each: _halved(each, 0, len(each.pieces.knots)) for each in jumping})
+
+
+def _halved(table: Tabulated, first: int, last: int) -> Expression:
+    """The pieces of a table from one knot to another, as a choice between two halves."""
+    u, knots = table.args[0], table.pieces.knots
+    if first == last:
+        away = u - number(float(knots[max(first - 1, 0)]))
+        row = table.pieces.derived(table.derived)[first]
+        return add(*(number(float(factor)) * away**k for k, factor in enumerate(row)))
+    middle = (first + last) // 2
+    halves = _halved(table, first, middle), _halved(table, middle + 1, last)
+    found: Expression = Select(Less(u, number(float(knots[middle]))), *halves)
+    return found

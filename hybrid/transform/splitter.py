@@ -19,7 +19,7 @@ from hybrid.expression.nodes import ZERO, Expression, Symbol
 from hybrid.expression.operations import And, Less, LessEqual, Not, Or
 from hybrid.expression.surfaces import Surfaces
 from hybrid.expression.switches import Resolved, Switches
-from hybrid.expression.tabulated import check_tables
+from hybrid.expression.tabulated import in_branches
 from hybrid.expression.tracing import TraceError, model_symbols, trace
 from hybrid.system.clocks import Clock
 from hybrid.system.derivatives import evaluate, sample_points
@@ -213,8 +213,7 @@ class Splitter:
         except TraceError as error:
             why = f"split: {what} cannot be traced, so its kinks and jumps cannot be found: {error}."
             raise ModelError(why) from error
-        check_tables(f"split: {what}", found, self.symbols.x)
-        return found
+        return in_branches(found, self.symbols.x)
 
     def _pieces(self, index: int, mode: Mode) -> Pieces:
         field = self._traced(f"the field of mode {mode.name!r}", field_function(mode, self.variables).value)

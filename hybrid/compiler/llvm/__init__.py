@@ -1,1 +1,1 @@
-"""Translation of generated statements to LLVM's text and to machine code."""
+"""Translation of the code of functions to LLVM's instructions and to machine code."""

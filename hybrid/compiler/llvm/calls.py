@@ -1,4 +1,4 @@
-"""Functions that generated text may call, as LLVM's instructions."""
+"""Functions that code may call, as LLVM's instructions."""
 
 from __future__ import annotations
 

@@ -315,6 +315,12 @@ class _Body:
     def _item(self, _: str, term: Any, place: int) -> Any:
         return self.value(term)[place]
 
+    def _rounded(self, _: str, term: Any) -> Any:
+        flags, self.flags = self.flags, ()
+        value = self.value(term)
+        self.flags = flags
+        return value
+
     def _several(self, _: str, *terms: Any) -> tuple[Any, ...]:
         return tuple(map(self.value, terms))
 
@@ -388,6 +394,7 @@ class _Body:
         "listed": _listed,
         "item": _item,
         "several": _several,
+        "rounded": _rounded,
         "if": _if,
         "neg": _negative,
         **dict.fromkeys(("+", "-", "*", "/", "//", "**", "%"), _arithmetic),

@@ -1,4 +1,4 @@
-"""Generated functions as machine code for this processor: optimised and emitted."""
+"""Functions as machine code for this processor: optimised and emitted."""
 
 from __future__ import annotations
 

@@ -13,10 +13,11 @@ import attrs
 
 from hybrid.compiler.taylor.roots import is_multiple, singular_bases, with_fractions
 from hybrid.expression.derivatives import derivative, partial_derivatives
-from hybrid.expression.graph import is_positive, is_whole, mentions, nodes
-from hybrid.expression.nodes import ZERO, Expression, Symbol
+from hybrid.expression.graph import is_positive, is_whole, mentions, nodes, replaced
+from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol
 from hybrid.expression.operations import Cos, Cosh, Exp, Sin, Sinh
 from hybrid.expression.signs import sign_of, simplified
+from hybrid.expression.tabulated import tables_of_time
 from hybrid.expression.tracing import Symbols
 
 ELEMENTARY = (Sin, Cos, Exp, Sinh, Cosh)
@@ -123,7 +124,7 @@ def in_terms_of_root(
 
 def _elementary(entry: Expression, symbols: Symbols) -> bool:
     """Whether time enters only through polynomials and through harmonics and exponentials of linear terms."""
-    for node in nodes(entry):
+    for node in nodes(replaced(entry, dict.fromkeys(tables_of_time(entry), ONE))):
         if not mentions(node, (symbols.t,)) or node.is_symbol or node.is_sum or node.is_product:
             continue
         if node.is_power and is_whole(node.exponent) and is_positive(node.exponent):

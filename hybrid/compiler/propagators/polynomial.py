@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from hybrid.compiler.emitted import Propagator
 from hybrid.compiler.propagators.equations import Equations, columns_of_guards
 from hybrid.compiler.propagators.writing import write_series
-from hybrid.expression.graph import degree_of
-from hybrid.expression.nodes import ZERO, Expression
+from hybrid.expression.graph import degree_of, replaced
+from hybrid.expression.nodes import ZERO, Expression, Symbol
+from hybrid.expression.tabulated import tables_of_time
 from hybrid.expression.tracing import Symbols
 from hybrid.kernels.types.codes import EXACT, HIGHEST_ORDER
 
@@ -34,6 +35,11 @@ def _polynomial(guard: Expression, symbols: Symbols) -> int:
     return 0 if degree is None else max(1, degree)
 
 
+def _with_powers(entry: Expression, t: Symbol) -> Expression:
+    """An expression with powers of time for the tables that are polynomials of time on each step."""
+    return replaced(entry, {each: t ** (each.pieces.degree - each.derived) for each in tables_of_time(entry)})
+
+
 def _degree(field: Sequence[Expression], jacobian: Sequence[Sequence[Expression]], symbols: Symbols) -> int:
     """Degree of the solutions in time if no component acts back on itself, else 0.
 
@@ -41,7 +47,7 @@ def _degree(field: Sequence[Expression], jacobian: Sequence[Sequence[Expression]
     cancel may be nilpotent without that; its series is exact, too.
     """
     clock = frozenset({symbols.t})
-    forcing = [degree_of(entry, clock) for entry in field]
+    forcing = [degree_of(_with_powers(entry, symbols.t), clock) for entry in field]
     # Components are done once all that act on them are done.
     acts_on: list[list[int]] = [[] for _ in field]
     waiting = []

@@ -30,6 +30,7 @@ from hybrid.expression.derivatives import derivative, directional, divergence
 from hybrid.expression.graph import mentions, nodes_of
 from hybrid.expression.nodes import ZERO, Expression, Symbol, add, order_of
 from hybrid.expression.operations import Absolute
+from hybrid.expression.tabulated import tables_of_time
 from hybrid.expression.tracing import Symbols
 from hybrid.kernels.types.codes import FROM_LAST_STEP, FROM_ZERO, NARROW, WIDE
 
@@ -52,7 +53,7 @@ def write_series(field: Sequence[Expression], guards: Sequence[Expression], symb
 
 
 def harmonics_of(field: Sequence[Expression], symbols: Symbols) -> dict[Expression, Symbol]:
-    """Symbols for the sines, cosines and exponentials of linear functions of time, closed under ``d/dt``.
+    """Symbols for harmonics, exponentials and tables of linear functions of time, closed under ``d/dt``.
 
     On a clock of their own they are states like others: their rates share the factor of all rates.
     """
@@ -63,6 +64,9 @@ def harmonics_of(field: Sequence[Expression], symbols: Symbols) -> dict[Expressi
             continue
         for function in PAIRS.get(type(node), (type(node),))[:2]:
             found.setdefault(function(node.args[0]), Symbol(f"h{len(found)}"))
+    for table in sorted(tables_of_time(*field), key=order_of):
+        for order in range(table.pieces.degree - table.derived + 1):
+            found.setdefault(table.differentiated(order), Symbol(f"h{len(found)}"))
     return found
 
 

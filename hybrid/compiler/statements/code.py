@@ -8,6 +8,7 @@ A term is a number (a whole one is an index or a count), or a tuple of an operat
 ``("listed", numbers, i)``            an entry of a list that is part of the code
 ``("item", term, i)``                 one of several numbers
 ``("several", a, b, ...)``            several numbers
+``("rounded", a)``                    a term in which nothing is fused
 ``("if", condition, a, b)``           a choice; only one of the two is computed
 ``("+", a, b)`` ...                   arithmetic, comparisons, ``"and"``, ``"or"``, ``"not"``, ``"neg"``
 ``("sin", a)`` ...                    a call of ``hybrid.compiler.llvm.calls``, or of a user's function

@@ -12,7 +12,7 @@ from hybrid.compiler.statements.code import Code, Statement, Term, at, call, eit
 from hybrid.expression import operations as ops
 from hybrid.expression.graph import nodes
 from hybrid.expression.nodes import TWO, Expression, Power, Product, Sum, power, split
-from hybrid.expression.tabulated import Tabulated
+from hybrid.expression.tabulated import Tabulated, tables_of_time
 
 COMPARISONS: dict[type[Expression], str] = {ops.Less: "<", ops.LessEqual: "<=", ops.Equal: "=="}
 CONNECTIVES: dict[type[Expression], str] = {ops.And: "and", ops.Or: "or"}
@@ -26,7 +26,9 @@ def assignments(targets: Sequence[Code], expressions: Sequence[Expression]) -> l
     ``targets`` may therefore overlap with variables that the expressions read.
     """
     uses = _uses(each for each in expressions if not each.is_number)
-    writer = _Writer(node for node, count in uses.items() if count > 1)
+    # A table is read at its very knots: fusing would move its argument to the other side of one.
+    rounded = [each.args[0] for each in tables_of_time(*expressions)]
+    writer = _Writer((node for node, count in uses.items() if count > 1), rounded)
     stores = []
     for k, (target, expression) in enumerate(zip(targets, expressions, strict=True)):
         value: Term = get(f"y{k}")
@@ -63,13 +65,14 @@ def unprintable(expressions: Iterable[Expression]) -> str | None:
 class _Writer:
     """Writes one block of statements; values that are needed several times become variables.
 
-    So do the expressions in ``shared``, which occur in several others.
+    So do the expressions in ``shared``, which occur in several others. Nothing is fused in those in
+    ``rounded``.
     """
 
-    def __init__(self, shared: Iterable[Expression] = ()) -> None:
+    def __init__(self, shared: Iterable[Expression], rounded: Iterable[Expression]) -> None:
         self.statements: list[Statement] = []
         self._variables: dict[Expression, Code] = {}
-        self._shared = frozenset(shared)
+        self._shared, self._rounded = frozenset(shared), frozenset(rounded)
 
     def assign(self, target: Term, expression: Expression) -> None:
         value = self.term(expression)  # may append statements, which must come first
@@ -92,6 +95,10 @@ class _Writer:
         return self._variables[expression]
 
     def _written(self, expression: Expression) -> Any:
+        term = self._term(expression)
+        return call("rounded", term) if expression in self._rounded and isinstance(term, Code) else term
+
+    def _term(self, expression: Expression) -> Any:
         if expression.is_symbol:
             return entry(expression.label)
         if expression.is_number:

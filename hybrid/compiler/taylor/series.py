@@ -8,51 +8,27 @@ multiplication per order, products and functions cost one convolution per order.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from hybrid.compiler.statements.code import Code, Statement, at, call, do, either, equal, get, put
-from hybrid.compiler.statements.values import Constants, root_power
+from hybrid.compiler.statements.values import Constants, assignments, root_power
 from hybrid.compiler.taylor.sums import Term, added
+from hybrid.expression import operations as ops
 from hybrid.expression.derivatives import derivative
-from hybrid.expression.graph import (
-    Group,
-    factors_of,
-    is_negative,
-    is_whole,
-    mentions,
-    nodes,
-    terms_of,
-)
+from hybrid.expression.graph import Group, factors_of, is_negative, is_whole, mentions, nodes, terms_of
 from hybrid.expression.nodes import ONE, TWO, ZERO, Expression, Symbol, add, multiply, number, power
-from hybrid.expression.operations import (
-    Arccos,
-    Arccosh,
-    Arcsin,
-    Arcsinh,
-    Arctan,
-    Arctanh,
-    Cos,
-    Cosh,
-    Exp,
-    Expm1,
-    Level,
-    Log,
-    Log1p,
-    Sin,
-    Sinh,
-    Tan,
-    Tanh,
-)
+from hybrid.expression.tabulated import Tabulated, has_knots_in_time
 from hybrid.kernels.types.codes import NARROW
 
-# Functions whose derivatives consist of operations with recurrences.
-BY_DERIVATIVE = (Log, Log1p, Expm1, Arcsin, Arccos, Arctan, Arcsinh, Arccosh, Arctanh)
 # A pair of functions, and the sign in the derivative of the second: cos' = -sin, cosh' = sinh.
-PAIRS = dict.fromkeys((Sin, Cos), (Sin, Cos, -1.0)) | dict.fromkeys((Sinh, Cosh), (Sinh, Cosh, 1.0))
+PAIRS = dict.fromkeys((ops.Sin, ops.Cos), (ops.Sin, ops.Cos, -1.0)) | dict.fromkeys(
+    (ops.Sinh, ops.Cosh), (ops.Sinh, ops.Cosh, 1.0)
+)
 # ``y' = (1 -+ y^2) u'``.
-OWN_SQUARE = {Tanh: -1, Tan: 1}
+OWN_SQUARE = {ops.Tanh: -1, ops.Tan: 1}
 # Longer inner sums are not expanded: other expressions may need them too.
 MOST_TERMS = 4
 # The order of a coefficient, the matrix of all coefficients, and the reciprocal of the order.
@@ -278,20 +254,25 @@ class Recurrences:
             return self._product(expression)
         if expression.is_power:
             return self._power(expression)
-        if isinstance(expression, Exp):
+        if isinstance(expression, ops.Exp):
             return self._exponential(expression, expression.args[0])
         if type(expression) in PAIRS:
             return self._pair(expression)
         if type(expression) in OWN_SQUARE:
             return self._own_square(expression)
         if expression.in_other_terms is not None:
-            value = self.coefficient(expression.in_other_terms(*expression.args))
-            return self._bind(expression, value, value)
-        if isinstance(expression, BY_DERIVATIVE):
+            return self._same(expression, expression.in_other_terms(*expression.args))
+        if expression.by_derivative:
             return self._by_derivative(expression)
-        if isinstance(expression, Level):
+        if isinstance(expression, Tabulated) and self.time is not None and has_knots_in_time(expression):
+            return self._table(expression, derivative(expression.args[0], self.time[0]))
+        if isinstance(expression, ops.Level):
             return self._bind(expression, call("np.floor", self.coefficient(*expression.args)), 0.0)
         raise NoSeries(f"{expression.word} is not analytic")
+
+    def _same(self, expression: Expression, other: Expression) -> Code:
+        value = self.coefficient(other)
+        return self._bind(expression, value, value)
 
     def _sum(self, expression: Expression) -> Code:
         terms = self._terms(expression)
@@ -402,8 +383,7 @@ class Recurrences:
     def _power(self, expression: Expression) -> Code:
         base, exponent = expression.args
         if not self._is_constant(exponent):
-            value = self.coefficient(Exp(exponent * Log(base)))
-            return self._bind(expression, value, value)
+            return self._same(expression, ops.Exp(exponent * ops.Log(base)))
         if is_whole(exponent) and is_negative(exponent):
             return self._quotient(expression, None, power(base, -exponent))
         if is_whole(exponent):
@@ -473,6 +453,18 @@ class Recurrences:
             self._enter(slope, s, s_column, s_name)
             self._enter(slope, c, c_column, c_name)
         return self.variables[expression]
+
+    def _table(self, expression: Tabulated, rate: Expression) -> Code:
+        """A table of what grows at a constant rate, a polynomial on each step: its knots end steps."""
+        name, higher = self._name(expression), either(equal(o, 0), 0.0, 0.0)
+        orders = range(1 + expression.pieces.degree - expression.derived)
+        values = [expression.differentiated(k) * rate**k / math.factorial(k) for k in orders]
+        later = [get(f"{name[1]}d{k}") for k in orders[1:]]
+        self.first += assignments([name, *later], values)
+        for order, coefficient in enumerate(later, 1):
+            higher = either(equal(o, order), coefficient, higher)
+        self.higher.append(put(name, higher))
+        return name
 
     def _own_square(self, expression: Expression) -> Code:
         sign = OWN_SQUARE[type(expression)]

@@ -20,6 +20,7 @@ from hybrid import (
     Transition,
     Tsit5,
     compile_system,
+    from_equations,
     simulate,
     simulate_many,
     split,
@@ -143,15 +144,29 @@ def test_guards_read_tables():
     assert simulate(ramp, (0.0,), (0.0, 4.0)).jumps.t == pytest.approx([2.0], rel=1e-12)
 
 
-def test_a_jump_in_the_state_is_told_and_not_split():
-    stairs = Table([0.0, 1.0], [1.0, 2.0], kind="step")
+def test_a_jump_in_the_state_is_told_and_a_surface_for_split():
+    stairs = Table([0.0, 1.0, 2.0, 4.0], [1.0, 2.0, 0.5, 0.25], kind="step")
     system = tank(lambda t, x, p: (stairs(x.q),))
     assert "its field jumps where q is at a point of a table" in str(compile_system(system))
-    with pytest.raises(ModelError, match="has a table of 2 points that jumps in the state"):
-        split(system)
+    apart = split(system)
+    assert "jumps" not in str(compile_system(apart))
+    arc = simulate(apart, (-1.0,), (0.0, 20.0), tangent=True)
+    np.testing.assert_allclose(arc.jumps.t, [2.0, 2.5, 6.5], rtol=1e-14)
+    assert arc["q"][-1] == pytest.approx(4.0 + 0.25 * 13.5, rel=1e-14)
+    # The speed at the end over the speed at the start.
+    assert arc.fundamental[0, 0] == pytest.approx(0.25, rel=1e-13)
     smooth = tank(lambda t, x, p: (stairs(t),))
     assert "jumps" not in str(compile_system(smooth))
     assert simulate(split(smooth), (0.0,), (0.0, 2.0))["q"][-1] == pytest.approx(3.0, abs=1e-14)
+
+
+def test_a_state_slides_on_a_jump_of_a_table():
+    gears = Table([0.0, 3.0, 6.0], [4.0, 2.0, 1.0], kind="step")
+    apart = from_equations(lambda t, x, p: (gears(x.w) - 3.0, x.w), state=("w", "angle"))
+    arc = simulate(apart, (0.5, 0.0), (0.0, 5.0))
+    assert arc.jumps[0].t == pytest.approx(2.5, rel=1e-14)
+    assert arc.mode[-1] == "w=3"
+    assert arc.x[-1] == pytest.approx([3.0, 1.75 * 2.5 + 3.0 * 2.5], rel=1e-14)
 
 
 @pytest.mark.parametrize(
