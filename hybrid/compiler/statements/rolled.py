@@ -268,6 +268,8 @@ class _Roller:
         for each in plan:
             if isinstance(each, _Repeated):
                 found.append(self._loop(each))
+            elif each[0] == "whole":
+                continue
             elif type(each[0]) is tuple:
                 statement, *plans = each
                 kept = statement[: -len(plans)]
@@ -277,11 +279,12 @@ class _Roller:
         return found
 
     def _plain(self, term: Any) -> Any:
-        """A statement or a term with cells in the place of variables."""
+        """A statement or a term with cells in the place of variables, and numbers in that of their names."""
         if not isinstance(term, tuple):
             return term
         if term[0] == "get":
-            return self._cell(term[1]) if term[1] in self.cells else term
+            name = term[1]
+            return self._cell(name) if name in self.cells else self.whole.get(name, term)
         return Code(map(self._plain, term))
 
     def _cell(self, name: str) -> Code:
