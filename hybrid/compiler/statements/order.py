@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hybrid.compiler.statements.code import Statement
+from hybrid.compiler.statements.code import Statement, at
 
 
 class Order:
@@ -25,18 +25,17 @@ class Order:
         reads, writes = list[Any](), list[Any]()
         if statement[0] == "do":
             _, array, *place, value = statement[1]
-            writes.append(self._cell(array[1], place))
-            self._find(value, reads)
+            target = at(array[1], *place)
         else:
-            target, value = statement[1], statement[2]
-            self._find(value, reads)
-            for each in target[1:] if target[0] == "several" else [target]:
-                if each[0] == "at":
-                    writes.append(self._cell(each[1], each[2:]))
-                    for index in each[2:]:
-                        self._find(index, reads)
-                else:
-                    writes.append(each[1])
+            _, target, value = statement
+        self._find(value, reads)
+        for each in target[1:] if target[0] == "several" else [target]:
+            if each[0] == "at":
+                writes.append(self._cell(each[1], each[2:]))
+                for index in each[2:]:
+                    self._find(index, reads)
+            else:
+                writes.append(each[1])
         level = 0
         for key in reads:
             level = max(level, self._latest(self.write, key))
@@ -64,16 +63,13 @@ class Order:
         operation, *parts = term
         if operation == "get":
             found.append(parts[0])
-        elif operation == "at":
-            found.append(self._cell(parts[0], parts[1:]))
-            for index in parts[1:]:
+        elif operation in ("at", "load"):
+            array, *place = parts
+            found.append(self._cell(array if operation == "at" else array[1], place))
+            for index in place:
                 self._find(index, found)
-        elif operation == "load":
-            found.append(self._cell(parts[0][1], parts[1:]))
-        elif operation == "convolved":
-            # It reads orders that are complete: nothing that statements beside it write.
-            return
         else:
+            # A convolution reads orders that are complete: nothing that statements beside it write.
             for part in parts:
                 self._find(part, found)
 
@@ -92,7 +88,7 @@ class Order:
             return ((), self.whole[term[1]]) if term[1] in self.whole else ((term[1],), 0)
         if term[0] == "+":
             (one, first), (other, second) = map(self._column, term[1:])
-            return one + other, first + second
+            return tuple(sorted(one + other, key=str)), first + second
         return (term,), 0
 
 

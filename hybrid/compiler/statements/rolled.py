@@ -22,7 +22,7 @@ from hybrid.kernels.types.codes import NARROW
 
 # A loop with its lists is about as much code as so many statements; fewer stay as they are.
 LEAST = 12
-NUMBER, LANES, WHOLE, TRUTH = range(4)
+NUMBER, LANES, WHOLE, TRUTH, RESULT = range(5)
 # The array of all cells of a kind.
 CELLS = {NUMBER: "numbers", LANES: "lanes"}
 TURN = get("turn")
@@ -81,17 +81,19 @@ class _Roller:
         self.sizes: Counter[int] = Counter()
         self.has_loops = False
         self.uses: Counter[str] = Counter()
+        self._count((*statements,))
         for statement in _simple(statements):
-            self._count(statement[1:])
             if statement[0] == "set":
                 self._learn(statement[1], statement[2])
 
     def _count(self, term: Any) -> None:
-        """Count the uses of variables; where one is set counts too."""
+        """Count the uses of variables; where one is set counts too. What items are taken of is a result."""
         if isinstance(term, tuple):
-            if term and term[0] == "get":
+            if term[:1] == ("get",):
                 self.uses[term[1]] += 1
             else:
+                if term[:1] == ("item",):
+                    self.kinds[term[1][1]] = RESULT
                 for part in term:
                     self._count(part)
 
@@ -99,7 +101,9 @@ class _Roller:
         if place[0] == "get":
             self.kinds.setdefault(place[1], self._kind(term))
         elif place[0] == "several":
-            self.kinds |= dict.fromkeys((each[1] for each in place[1:]), self._kind(term))
+            terms = term[1:] if term[0] == "several" else [term] * len(place[1:])
+            for each, part in zip(place[1:], terms, strict=True):
+                self._learn(each, part)
 
     def _kind(self, term: Any) -> int:
         """What a term is: a number, four numbers, a whole number or a truth value."""
@@ -153,12 +157,11 @@ class _Roller:
     def _grouped(self, statements: list[Statement]) -> list[Any]:
         if len(statements) < LEAST:
             return [*statements]
-        levels = Order(self.whole)
         groups: dict[Any, list[tuple[Statement, list[Any]]]] = {}
-        for statement in self._directly(statements):
+        for level, statement in self._levels(statements):
             slots: list[Any] = []
             shape = self._shape(statement, slots)
-            groups.setdefault((levels.of(statement), shape), []).append((statement, slots))
+            groups.setdefault((level, shape), []).append((statement, slots))
         if max(map(len, groups.values())) < LEAST:
             return [*statements]
         plan = list[Any]()
@@ -192,29 +195,39 @@ class _Roller:
             return plan + [members[i] for i in rest]
         return [*plan, _Repeated([members[i] for i in rest], [slots[i] for i in rest])]
 
-    def _directly(self, statements: Sequence[Statement]) -> list[Statement]:
-        """Statements that write a result at once, not by a variable that nothing else reads."""
-        found = dict[int, Statement](enumerate(statements))
-        written_at: dict[str, int] = {}
-        for place, (kind, *parts) in enumerate(statements):
-            if kind != "set":
-                continue
-            target, value = parts
-            if target[0] == "get":
-                written_at[target[1]] = place
-            elif type(value) is Code and value[0] == "get" and self.uses[value[1]] == 2:
-                earlier = written_at.get(value[1])
-                if earlier is not None:
-                    found[earlier] = put(target, found[earlier][2])
-                    del found[place]
-        return [*found.values()]
+    def _levels(self, statements: Sequence[Statement]) -> list[tuple[int, Statement]]:
+        """Statements with their levels; a result is not first given to a variable that nothing else reads."""
+        order = Order(self.whole)
+        found = list[tuple[int, Statement]]()
+        set_at: dict[str, int] = {}
+        for statement in statements:
+            name = self._only_stored(statement)
+            if name in set_at:
+                level, earlier = found[set_at[name]]
+                if order.of(put(statement[1], 0.0)) <= level:
+                    found[set_at[name]] = level, put(statement[1], earlier[2])
+                    order.of(statement)
+                    continue
+            if statement[0] == "set" and statement[1][0] == "get":
+                set_at[statement[1][1]] = len(found)
+            found.append((order.of(statement), statement))
+        return found
+
+    def _only_stored(self, statement: Statement) -> str | None:
+        """The variable that a statement writes to an array, if nothing else reads the variable."""
+        if statement[0] == "do" or statement[1][0] == "get":
+            return None
+        value = statement[2]
+        is_name = isinstance(value, tuple) and value[0] == "get" and self.uses[value[1]] == 2
+        return value[1] if is_name else None
 
     def _shape(self, term: Any, slots: list[Any]) -> Any:
         """A statement or a term without its numbers and variables, which are appended to ``slots``."""
         kind = type(term)
         if kind is int or kind is float:
             slots.append(term)
-            return kind
+            # A negative zero equals zero, but is another number.
+            return "-0.0" if str(term) == "-0.0" else kind
         if kind is str:
             return term
         if term[0] == "get":
@@ -255,6 +268,8 @@ class _Roller:
         for each in plan:
             if isinstance(each, _Repeated):
                 found.append(self._loop(each))
+            elif each[0] == "whole":
+                continue
             elif type(each[0]) is tuple:
                 statement, *plans = each
                 kept = statement[: -len(plans)]
@@ -264,11 +279,12 @@ class _Roller:
         return found
 
     def _plain(self, term: Any) -> Any:
-        """A statement or a term with cells in the place of variables."""
+        """A statement or a term with cells in the place of variables, and numbers in that of their names."""
         if not isinstance(term, tuple):
             return term
         if term[0] == "get":
-            return self._cell(term[1]) if term[1] in self.cells else term
+            name = term[1]
+            return self._cell(name) if name in self.cells else self.whole.get(name, term)
         return Code(map(self._plain, term))
 
     def _cell(self, name: str) -> Code:

@@ -10,7 +10,7 @@ import pytest
 from hybrid.compiler.compiled import compile_system
 from hybrid.compiler.emit import emit
 from hybrid.compiler.llvm.functions import compiled_part, own_functions
-from hybrid.compiler.parts import EVENTS, FIELDS, PARTS
+from hybrid.compiler.parts import EVENTS, FIELDS
 from hybrid.errors import ModelError
 from hybrid.kernels.types.codes import EXACT, RUNGE_KUTTA
 from hybrid.system.derivatives import sample_points
@@ -18,8 +18,8 @@ from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import field_function, guard_function, reset_function
 from hybrid.system.graph import HybridSystem
 from hybrid.system.variables import PARAMETERS, STATE, named_values
+from tests.hybrid.code import called, functions_in
 from tests.hybrid.systems import ball
-from tests.hybrid.text import called
 
 
 def load(emitted, *, compiled):
@@ -28,16 +28,14 @@ def load(emitted, *, compiled):
         own = own_functions(emitted)
         functions = compiled_part(emitted, FIELDS, own) | compiled_part(emitted, EVENTS, own)
         return {name: called(function) for name, function in functions.items()}
-    scope = {}
+    calls = {}
     for name, own in emitted.opaque.items():
-        scope |= {name: in_python(own), f"{name}_slopes": slopes_in_python(own)}
-    exec(emitted.texts[FIELDS], scope)
-    exec(emitted.texts[EVENTS], scope)
-    return {name: scope[name] for name in (*PARTS[FIELDS], *PARTS[EVENTS])}
+        calls |= {name: in_python(own), f"{name}_slopes": slopes_in_python(own)}
+    return functions_in(emitted.texts[FIELDS] + emitted.texts[EVENTS], calls)
 
 
 def in_python(own):
-    """The functions that generated text calls, in plain Python: all numbers of a function in one row."""
+    """The functions that the code calls, in plain Python: all numbers of a function in one row."""
 
     def values(t, x, p):
         parameters = named_values(PARAMETERS, own.parameters, p)
@@ -64,8 +62,7 @@ def run(function, shape, index, t, x, p):
     # The Jacobian of a field leaves out what is zero.
     out = np.zeros(shape) if len(shape) == 2 else np.full(shape, 777.0)
     padded = np.append(x, [1e300, math.nan])
-    with np.errstate(all="ignore"):
-        function(index, float(t), padded, p, out)
+    function(index, float(t), padded, p, out)
     return out
 
 
@@ -152,15 +149,19 @@ def opaque():
     )
 
 
-def opaque_chain():
+def opaque_chain(n=3):
     def field(t, x, p):
         return -x * t if p.e > 1 else np.cos(x) * x[::-1] + t**2
 
-    return mode_system(field, state=3, parameters={"e": 0.8})
+    return mode_system(field, state=n, parameters={"e": 0.8})
+
+
+def long_opaque_chain():
+    return opaque_chain(14)
 
 
 @pytest.mark.parametrize("compiled", [False, True], ids=["plain", "compiled"])
-@pytest.mark.parametrize("model", [ball, hertz, chain, two_modes, opaque, opaque_chain])
+@pytest.mark.parametrize("model", [ball, hertz, chain, two_modes, opaque, opaque_chain, long_opaque_chain])
 def test_every_function_agrees_with_the_model(model, compiled):
     system = model()
     n, p = system.dimension, system.parameter_values()
@@ -189,13 +190,6 @@ def test_no_reset_is_the_identity():
     x, p = np.array([3.0, 4.0]), np.ones(3)
     np.testing.assert_array_equal(run(functions["reset"], (2,), 0, 0.0, x, p), x)
     np.testing.assert_array_equal(run(functions["reset_jacobian"], (2, 3), 0, 0.0, x, p), np.eye(2, 3))
-
-
-def test_a_result_may_overwrite_the_state():
-    functions = load(emit(mode_system(lambda t, x, p: (x.v, -x.q))), compiled=False)
-    x = np.array([3.0, 4.0])
-    functions["field"](0, 0.0, x, np.empty(0), x)
-    np.testing.assert_array_equal(x, [4.0, -3.0])
 
 
 @pytest.mark.parametrize("power", [1.5, 2.5, 2, 3])
@@ -236,8 +230,9 @@ def test_division_by_zero_follows_ieee():
 
 def test_half_powers_are_roots_and_whole_powers_products():
     source = emit(hertz()).texts[FIELDS]
-    assert "sqrt(" in source
-    assert "**1.5" not in source
+    assert '"sqrt"' in source
+    assert "**" in source  # the power 1/4
+    assert "1.5]" not in source
     assert "**" not in emit(mode_system(lambda t, x, p: (x.q**5, x.v**-1.5 + x.q**2.0))).texts[FIELDS]
 
 

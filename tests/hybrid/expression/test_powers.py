@@ -6,23 +6,20 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hybrid.expression.code import IMPORTS, assignments
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybrid import DOP853, HybridSystem, Mode, Taylor, simulate, split
 from hybrid.expression.derivatives import jacobian_of
 from hybrid.expression.tracing import model_symbols, trace
+from tests.hybrid.code import values_of
 
 
 def printed(function, value):
     """The value and the slope of a function of one variable, by the generated code."""
     [expression] = trace(lambda t, x, p: (function(x.a),), ("a",), ())
     [[slope]] = jacobian_of([expression], model_symbols(1, 0).x)
-    names = {"x": [np.float64(value)]}
-    with np.errstate(all="ignore"):
-        exec(IMPORTS + "\n".join(assignments(["found", "slope"], [expression, slope])), names)
-    return float(names["found"]), float(names["slope"])
+    return tuple(map(float, values_of([expression, slope], [value])))
 
 
 def loop(base, n):

@@ -1,10 +1,7 @@
 """Surfaces of switching functions, what their sides imply, and the smooth branches between them."""
 
-import math
-
 import numpy as np
 import pytest
-from hybrid.expression.code import assignments
 
 from hybrid.expression.graph import symbols_of
 from hybrid.expression.implications import MOST_TERMS
@@ -19,6 +16,7 @@ from hybrid.expression.switches import (
 )
 from hybrid.expression.text import text
 from hybrid.expression.tracing import model_symbols, trace
+from tests.hybrid.code import values_of
 
 SYMBOLS = model_symbols(2, 1)
 (Q, V), (K,), T = SYMBOLS.x, SYMBOLS.p, SYMBOLS.t
@@ -30,13 +28,7 @@ def traced(function):
 
 def value(expression, t, q, v):
     """Value of an expression, from the code that would be compiled; nan if it has none."""
-    out = np.zeros(1)
-    scope = {"t": t, "x": (q, v), "p": (1.0,), "out": out, "np": np, **vars(math)}
-    try:
-        exec("\n".join(assignments(["out[0]"], [expression])), scope)
-    except ValueError:
-        return np.nan
-    return out[0]
+    return values_of([expression], (q, v), (1.0,), t)[0]
 
 
 class TestFirst:

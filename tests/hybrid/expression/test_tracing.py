@@ -2,24 +2,14 @@ import math
 
 import numpy as np
 import pytest
-from hybrid.expression.code import assignments
 
 from hybrid.errors import ModelError
 from hybrid.expression.nodes import number
 from hybrid.expression.tracing import model_symbols, trace
 from hybrid.expression.values import TraceError
+from tests.hybrid.code import values_of
 
 NAMES = ("a", "b")
-
-
-def evaluate(expressions, t, x, p):
-    """Values of traced expressions, from the code that would be compiled."""
-    out = np.zeros(len(expressions))
-    lines = assignments([f"out[{i}]" for i in range(len(expressions))], expressions)
-    scope = {"t": t, "x": x, "p": p, "out": out, "np": np, **vars(math)}
-    with np.errstate(all="ignore"):
-        exec("\n".join(lines), scope)
-    return out
 
 
 def traced_scalar(function):
@@ -44,7 +34,7 @@ def traced_scalar(function):
     ],
 )
 def test_operators_and_choices(function, x):
-    result = evaluate(traced_scalar(function), 0.0, np.array(x), [])
+    result = values_of(traced_scalar(function), x)
     np.testing.assert_allclose(result, [function(*map(np.float64, x))], rtol=1e-15)
 
 
@@ -71,7 +61,7 @@ ARRAY = np.array([0.5, -1.5, 2.0, 0.25])
 )
 def test_arrays(function):
     p = type("P", (), {"k": 3.0})
-    result = evaluate(trace(function, 4, ("k",)), 2.0, ARRAY, [3.0])
+    result = values_of(trace(function, 4, ("k",)), ARRAY, [3.0], t=2.0)
     np.testing.assert_allclose(result, np.ravel(function(2.0, ARRAY, p)), rtol=1e-15)
 
 
@@ -121,7 +111,7 @@ def test_piecewise_with_and_without_a_default(x):
         return np.piecewise(a, [a < 0, a > 1], [lambda z: -z, lambda z: z * z])
 
     for function in (with_default, without):
-        found = evaluate(traced_scalar(function), 0.0, np.array([x, 0.0]), [])
+        found = values_of(traced_scalar(function), [x, 0.0])
         assert found[0] == function(np.array([x]), None)[0]
 
 

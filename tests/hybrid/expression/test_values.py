@@ -6,10 +6,10 @@ import warnings
 
 import numpy as np
 import pytest
-from hybrid.expression.code import assignments
 
 from hybrid.expression.tracing import trace
 from hybrid.expression.values import TraceError, _content
+from tests.hybrid.code import values_of
 
 POINTS = [
     np.array([0.75, -0.5, 1.5, 0.25]),
@@ -19,8 +19,6 @@ POINTS = [
 ]
 for point in POINTS:
     point.flags.writeable = False
-# NumPy's functions give nan where those of ``math`` raise an error.
-MATH = {name: getattr(np, name, function) for name, function in vars(math).items() if name[0] != "_"}
 # Functions of files, of settings, of indices and of NumPy itself.
 NOT_OF_NUMBERS = {
     *("fromfile", "fromregex", "genfromtxt", "getbufsize", "geterr", "geterrcall", "get_include", "info"),
@@ -72,18 +70,6 @@ CALLS = [
 ]
 
 
-def evaluate(expressions, x):
-    """Values of traced expressions, from the code to be compiled; infinite where Python divides by 0."""
-    out = np.zeros(len(expressions))
-    lines = assignments([f"out[{i}]" for i in range(len(expressions))], expressions)
-    try:
-        with np.errstate(all="ignore"):
-            exec("\n".join(lines), {"x": x, "out": out, "np": np, **MATH})
-    except ZeroDivisionError:
-        return np.full_like(out, np.inf)
-    return out
-
-
 def untraced(call, function):
     """The values at all points, or None if NumPy does not have them."""
     try:
@@ -108,7 +94,7 @@ def test_every_function_of_numpy(call):
                 expressions = trace(lambda t, x, p, f=function: flat(call(f, x)), 4, ())
             except TraceError:
                 continue
-            found = np.array([evaluate(expressions, x) for x in POINTS])
+            found = np.array([values_of(expressions, x) for x in POINTS])
         followed += 1
         finite = np.isfinite(wanted) & ~np.isinf(found)
         if not np.allclose(found[finite], wanted[finite], rtol=1e-13, atol=1e-15):
@@ -140,7 +126,7 @@ def test_a_sum_of_booleans_is_a_boolean_and_the_sum_of_a_list_counts_them(functi
         expressions = trace(lambda t, x, p: (function(x[0], x[1]),), 2, ())
     except TraceError:
         return
-    assert evaluate(expressions, np.array(x)) == float(function(*map(np.float64, x)))
+    assert values_of(expressions, x) == float(function(*map(np.float64, x)))
 
 
 @pytest.mark.parametrize(
@@ -176,7 +162,7 @@ def test_entries_that_a_condition_picks_may_be_set():
 
     expressions = trace(lambda t, x, p: clipped(x), 4, ())
     for x in POINTS:
-        np.testing.assert_array_equal(evaluate(expressions, x), clipped(x))
+        np.testing.assert_array_equal(values_of(expressions, x), clipped(x))
 
 
 @pytest.mark.parametrize("divisor", [0.1, 0.3, -0.7, 3.0, 1e-3, math.inf, -math.inf])
@@ -189,7 +175,7 @@ def test_whole_quotients_are_those_of_the_exact_numbers(divisor):
         expressions = trace(lambda t, x, p, f=function: (f(x),), 2, ())
         for a in multiples:
             x = np.array([a, divisor])
-            assert evaluate(expressions, x) == function(x), (a, divisor)
+            assert values_of(expressions, x) == function(x), (a, divisor)
 
 
 @pytest.mark.parametrize("ufunc", [np.fmax, np.fmin])
@@ -197,7 +183,7 @@ def test_a_number_is_larger_and_smaller_than_nan(ufunc):
     expressions = trace(lambda t, x, p: (ufunc(x[0], x[1]), ufunc(x[0], 2.0), ufunc(2.0, x[1])), 2, ())
     for x in ((1.0, math.nan), (math.nan, 1.0), (3.0, 1.0), (math.nan, math.nan)):
         wanted = [ufunc(*x), ufunc(x[0], 2.0), ufunc(2.0, x[1])]
-        np.testing.assert_array_equal(evaluate(expressions, np.array(x)), wanted)
+        np.testing.assert_array_equal(values_of(expressions, x), wanted)
 
 
 def test_an_array_without_axes_is_its_number():
@@ -231,13 +217,7 @@ def values_of_array(function):
 
 
 def computed(expressions):
-    out = np.zeros(len(expressions))
-    code = "\n".join(assignments([f"out[{i}]" for i in range(len(out))], expressions))
-    rows = []
-    for x in PLACES:
-        exec(code, {"x": x, "out": out, "np": np, **vars(math)})
-        rows.append(out.tolist())
-    return rows
+    return [values_of(expressions, x).tolist() for x in PLACES]
 
 
 def between(low, value, high):

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 from numba import njit
 
+from hybrid.compiler.statements.code import call, do, get, put, several
+from hybrid.compiler.taylor.loops import ORDER, VECTORS
+from hybrid.compiler.taylor.series import OUT
 from hybrid.kernels.arithmetic.columns import (
     evaluate,
     evaluate_with_sizes,
@@ -11,7 +14,7 @@ from hybrid.kernels.arithmetic.columns import (
 )
 from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL
 from hybrid.kernels.types.numba_door.numba_types import signature_of
-from tests.hybrid.text import both
+from tests.hybrid.code import both
 
 NOTHING = np.zeros(1)
 
@@ -32,39 +35,37 @@ def pair(columns=44):
 
 
 def test_convolve():
-    """The widths of a convolution and of its registers are constants of the text, one branch per width."""
+    """The widths of a convolution and of its registers are constants of the code, one case per width."""
     cases = [
         (width, inset, widest, name)
         for width in (4, 8, 12, 20, 36)
         for inset in (1, 2)
         for widest, name in ((4, "convolve"), (8, "convolve"), (8, "convolve_pairs"))
     ]
-    lines = []
-    for i, (width, inset, widest, name) in enumerate(cases):
-        lines += [f"if index == {i}:", f"    {name}(out, order, {inset}, 3, 43, {width}, {widest})"]
-    as_python, as_machine_code = both(lines, fused=True)
+    bodies = [[do(name, OUT, ORDER, inset, 3, 43, width, widest)] for width, inset, widest, name in cases]
+    interpreted, compiled = both(*bodies, fused=True)
     for i in range(len(cases)):
         for order in (1, 2, 3, 4, 7, 28):
             series, plain = pair(80)
-            as_python(i, 0.0, NOTHING, NOTHING, order, plain)
-            as_machine_code(i, 0.0, NOTHING, NOTHING, order, series)
+            interpreted(i, 0.0, NOTHING, NOTHING, order, plain)
+            compiled(i, 0.0, NOTHING, NOTHING, order, series)
             np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
 
 
 def test_the_sums_of_a_convolution_as_registers():
     widths = (4, 8, 12, 20, 36, 60)
-    lines = []
-    for i, width in enumerate(widths):
-        names = "".join(f"r{place}, " for place in range(0, width, 4))
-        lines += [f"if index == {i}:", f"    {names}= convolved(out, order, 1, 3, 63, {width}, 8)"]
-        lines += [f"    store(out, order, {63 + place}, r{place})" for place in range(0, width, 4)]
-    as_python, as_machine_code = both(lines, fused=True)
+    bodies = []
+    for width in widths:
+        names = {place: get(f"r{place}") for place in range(0, width, 4)}
+        sums = put(several([*names.values()]), call("convolved", OUT, ORDER, 1, 3, 63, width, 8))
+        bodies.append([sums, *(do("store", OUT, ORDER, 63 + place, each) for place, each in names.items())])
+    interpreted, compiled = both(*bodies, fused=True)
     for i, width in enumerate(widths):
         for order in (1, 2, 3, 4, 7, 28):
             series, plain = pair(124)
             expected = sum(plain[j, 3] * plain[order - j, 63 : 63 + width] for j in range(1, order))
-            as_python(i, 0.0, NOTHING, NOTHING, order, plain)
-            as_machine_code(i, 0.0, NOTHING, NOTHING, order, series)
+            interpreted(i, 0.0, NOTHING, NOTHING, order, plain)
+            compiled(i, 0.0, NOTHING, NOTHING, order, series)
             np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
             np.testing.assert_allclose(plain[order, 63 : 63 + width], expected, rtol=1e-13, atol=1e-14)
 
@@ -75,15 +76,12 @@ def test_the_sums_of_a_convolution_as_registers():
 def test_a_convolution_in_two_parts(convolve, ends):
     """The terms with the order before are added to the others later."""
     widths = (4, 8, 12, 20, 36)
-    lines = []
-    for i, width in enumerate(widths):
-        lines += [
-            f"if index == {i}:",
-            f"    {convolve}(out, order, 2, 3, 43, {width}, 8)",
-            f"    {ends}(out, order, 3, 43, {width}, 8)",
-        ]
-    whole, _ = both([f"{convolve}(out, order, 1, 3, 43, 36, 8)"], fused=True)
-    for run in both(lines, fused=True):
+    bodies = [
+        [do(convolve, OUT, ORDER, 2, 3, 43, width, 8), do(ends, OUT, ORDER, 3, 43, width, 8)]
+        for width in widths
+    ]
+    whole, _ = both([do(convolve, OUT, ORDER, 1, 3, 43, 36, 8)], fused=True)
+    for run in both(*bodies, fused=True):
         for i, width in enumerate(widths):
             for order in (2, 3, 4, 7, 28):
                 series, plain = pair(80)
@@ -114,18 +112,13 @@ def test_evaluate(order, width, plain_function, compiled):
 def test_combine(count):
     numbers = tuple(np.random.default_rng(count).normal(size=count).tolist())
     widths = (4, 8, 12)
-    lines = []
-    for i, width in enumerate(widths):
-        lines += [
-            f"if index == {i}:",
-            f"    combine(out, order, 14, {width}, ({', '.join(map(repr, map(float, numbers)))},))",
-        ]
-    as_python, as_machine_code = both(lines, fused=True)
+    bodies = [[do("combine", OUT, ORDER, 14, width, several(numbers))] for width in widths]
+    interpreted, compiled = both(*bodies, fused=True)
     for i, width in enumerate(widths):
         for order in (1, 2, 28):
             series, plain = pair(100)
-            as_python(i, 0.0, NOTHING, NOTHING, order, plain)
-            as_machine_code(i, 0.0, NOTHING, NOTHING, order, series)
+            interpreted(i, 0.0, NOTHING, NOTHING, order, plain)
+            compiled(i, 0.0, NOTHING, NOTHING, order, series)
             np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
             expected = sum(number * plain[order, 14 + width * c] for c, number in enumerate(numbers))
             assert series[order, 0] == pytest.approx(expected, rel=1e-13, abs=1e-14)
@@ -133,10 +126,10 @@ def test_combine(count):
 
 @pytest.mark.parametrize(("n", "width"), [(1, 4), (2, 8), (4, 8), (7, 12)])
 def test_combine_tangents(n, width):
-    as_python, as_machine_code = both([f"combine_tangents(out, order, 5, {width}, 100, {n})"], fused=True)
+    interpreted, compiled = both([do("combine_tangents", OUT, ORDER, 5, width, 100, n)], fused=True)
     series, plain = pair(140)
-    as_python(0, 0.0, NOTHING, NOTHING, 9, plain)
-    as_machine_code(0, 0.0, NOTHING, NOTHING, 9, series)
+    interpreted(0, 0.0, NOTHING, NOTHING, 9, plain)
+    compiled(0, 0.0, NOTHING, NOTHING, 9, series)
     np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
     matrix = plain[9, 5 : 5 + width * n].reshape(n, width)[:, :n].T
     vectors = plain[0, 100 : 100 + 4 * n].reshape(n, 4)
@@ -147,7 +140,7 @@ def test_combine_tangents(n, width):
 def test_tangent_vectors_there_and_back(count):
     """Vectors that do not fill a register are padded with zeros."""
     y = np.random.default_rng(count).normal(size=3 * (1 + count))
-    runs = both(["vectors = 8", "spread_tangents(x, 3, out, vectors, 20)"])
+    runs = both([put(VECTORS, 8), do("spread_tangents", get("x"), 3, OUT, VECTORS, 20)])
     found = []
     for run in runs:
         series, back = np.full((2, 60), 7.0), y.copy()

@@ -5,22 +5,33 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from tests.hybrid.text import both
+from hybrid.compiler.statements.code import at, call, do, get, put, several
+from hybrid.compiler.taylor.series import OUT
+from tests.hybrid.code import both
 
 # Row 0 holds two times four numbers, row 1 their dot product with a and b, row 2 one of all of these.
-TEXT = [
-    "a, b, by = p[0], p[1], p[2]",
-    "first, second, nothing = load(out, 0, 0), load(out, 0, 4), four_times(0.0)",
-    "high, low = divided_dot_product((a, b, ), (first, second, ), (nothing, nothing, ), 1.0)",
-    "store(out, 1, 0, high)",
-    "store(out, 1, 4, low)",
-    "high, low = divided_dot_product((b, a, ), (high, second, ), (low, nothing, ), by)",
-    "store(out, 2, 0, high)",
-    "store(out, 2, 4, low)",
+a, b, by = (at("p", i) for i in range(3))
+first, second, nothing, high, low = map(get, ("first", "second", "nothing", "high", "low"))
+
+
+def product(factors, highs, lows, by):
+    return put(several([high, low]), call("divided_dot_product", *map(several, (factors, highs, lows)), by))
+
+
+BODY = [
+    put(first, call("load", OUT, 0, 0)),
+    put(second, call("load", OUT, 0, 4)),
+    put(nothing, call("four_times", 0.0)),
+    product((a, b), (first, second), (nothing, nothing), 1.0),
+    do("store", OUT, 1, 0, high),
+    do("store", OUT, 1, 4, low),
+    product((b, a), (high, second), (low, nothing), by),
+    do("store", OUT, 2, 0, high),
+    do("store", OUT, 2, 4, low),
 ]
 
 
-@pytest.mark.parametrize("run", both(TEXT, fused=True), ids=["Python", "compiled"])
+@pytest.mark.parametrize("run", both(BODY, fused=True), ids=["plain", "compiled"])
 @pytest.mark.parametrize("seed", range(20))
 def test_twice_the_digits(run, seed):
     rng = np.random.default_rng(seed)

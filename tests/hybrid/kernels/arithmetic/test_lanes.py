@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from numba import njit
 
+from hybrid.compiler.statements.code import at, call, do, several
+from hybrid.compiler.taylor.series import OUT
 from hybrid.kernels.arithmetic.lanes import (
     NARROW,
     four_times,
@@ -16,7 +18,7 @@ from hybrid.kernels.arithmetic.lanes import (
     square_root,
     store,
 )
-from tests.hybrid.text import both
+from tests.hybrid.code import both
 
 EXPRESSIONS = {
     "sum": lambda a, b, s: a + b,
@@ -79,7 +81,7 @@ def test_a_row_is_written_in_whole_registers(count, filled):
     numbers = tuple(1.0 + i for i in range(count))
     expected = np.full((3, 20), np.nan)
     expected[1, 2 : 2 + count], expected[1, 2 + count : 2 + filled] = numbers, 0.0
-    for run in both([f"store_row(out, 1, 2, {numbers})"]):
+    for run in both([do("store_row", OUT, 1, 2, several(numbers))]):
         matrix = np.full((3, 20), np.nan)
         run(0, 0.0, np.zeros(1), np.zeros(1), 0, matrix)
         np.testing.assert_array_equal(matrix, expected)
@@ -88,20 +90,23 @@ def test_a_row_is_written_in_whole_registers(count, filled):
 def test_a_register_is_written_down_a_column():
     expected = np.arange(60.0).reshape(3, 20)
     expected[1, [2, 7, 12, 17]] = expected[0, :4]
-    for run in both(["store_down(out, 1, 2, 5, load(out, 0, 0))"]):
+    for run in both([do("store_down", OUT, 1, 2, 5, call("load", OUT, 0, 0))]):
         matrix = np.arange(60.0).reshape(3, 20)
         run(0, 0.0, np.zeros(1), np.zeros(1), 0, matrix)
         np.testing.assert_array_equal(matrix, expected)
 
 
 @pytest.mark.parametrize(
-    "text",
-    ["a + b", "a - b", "a*b", "a/b", "-a", "s*a + (s - b)", "(a - s)/2.0 + b*s", "four_times(s)*a", "s"],
+    "function",
+    [
+        *(EXPRESSIONS[name] for name in EXPRESSIONS if name != "functions"),
+        lambda a, b, s: call("four_times", s) * a,
+    ],
 )
-def test_arithmetic_of_generated_text(text):
-    lines = ["s = p[0]", "a, b = load(out, 0, 1), load(out, 1, 2)", f"store(out, 2, 3, {text})"]
+def test_arithmetic_of_statements(function):
+    a, b = call("load", OUT, 0, 1), call("load", OUT, 1, 2)
     found = []
-    for run in both(lines):
+    for run in both([do("store", OUT, 2, 3, function(a, b, at("p", 0)))]):
         matrix = np.random.default_rng(1).normal(size=(3, 8))
         run(0, 0.0, np.zeros(1), np.array([0.3]), 0, matrix)
         found.append(matrix)

@@ -1,4 +1,4 @@
-"""Generated code has the values of its expressions, at ties and infinities, too."""
+"""Statements have the values of their expressions, at ties and infinities, too."""
 
 import itertools
 import math
@@ -8,10 +8,13 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hybrid.expression.code import IMPORTS, assignments, power_text, unprintable
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from hybrid.compiler.llvm.lowering import VECTOR_SIGNATURE
+from hybrid.compiler.statements.code import at as entry
+from hybrid.compiler.statements.code import get, put
+from hybrid.compiler.statements.values import Constants, assignments, root_power, unprintable
 from hybrid.expression.derivatives import jacobian_of
 from hybrid.expression.nodes import ONE, TWO, Function, number
 from hybrid.expression.operations import (
@@ -28,16 +31,13 @@ from hybrid.expression.operations import (
     Sin,
     Step,
 )
+from tests.hybrid.code import both, interpreted, values_of
 from tests.hybrid.expression.formulas import X, Y, Z, anything, at, expression_of, places, smooth
 
 
 def run(expressions, x, y, z=0.0):
-    """Values of the generated code."""
-    out = np.zeros(len(expressions))
-    lines = assignments([f"out[{i}]" for i in range(len(expressions))], expressions)
-    with np.errstate(all="ignore"):
-        exec(IMPORTS + "\n".join(lines), {"x": (x, y), "p": (z,), "out": out})
-    return out
+    """Values of the code."""
+    return values_of(expressions, (x, y), (z,))
 
 
 @settings(max_examples=200)
@@ -70,11 +70,14 @@ def test_powers(exponent, parts):
 
 
 @pytest.mark.parametrize("exponent", [-7, -3, -1, 1, 3, 7])
-def test_half_integer_powers_in_series(exponent):
-    text = power_text("z", number(Fraction(exponent, 2)), "n")
-    assert "**" not in text
-    assert eval(text, {"z": 1.7, "sqrt": math.sqrt}) == pytest.approx(1.7 ** (exponent / 2), rel=1e-15)
-    assert power_text("z", number(Fraction(exponent, 3)), "n") == "z**n"
+def test_half_integer_powers_are_products_with_a_root(exponent):
+    code = root_power(entry("x", 0), number(Fraction(exponent, 2)), get("t"))
+    assert "**" not in str(code)
+    for run in both([put(entry("out", 0), code)], kind=VECTOR_SIGNATURE):
+        out = np.zeros(1)
+        run(0, 0.0, np.array([1.7]), np.zeros(1), out)
+        assert out[0] == pytest.approx(1.7 ** (exponent / 2), rel=1e-15)
+    assert root_power(get("z"), number(Fraction(exponent, 3)), get("n")) == ("**", get("z"), get("n"))
 
 
 @pytest.mark.parametrize(
@@ -114,17 +117,9 @@ def test_conditions(condition, holds):
         assert [*found] == [true, 3.0 * true + x, x if true else 2.0]
 
 
-def test_stores_come_after_all_values():
-    """Targets may be variables that the expressions read."""
-    space = {"x": [3.0, 1.0]}
-    exec("\n".join(assignments(["x[0]", "x[1]"], [X + Y, X - Y])), space)
-    assert space["x"] == [4.0, 2.0]
-
-
 def test_what_is_used_twice_is_computed_once():
     long = Sin(X * Y + Z)
-    text = "\n".join(assignments(["a", "b"], [long + 1, long * X]))
-    assert text.count("sin(") == 1
+    assert str(assignments([get("a"), get("b")], [long + 1, long * X])).count("'sin'") == 1
 
 
 def test_functions_without_code_are_named():
@@ -138,20 +133,20 @@ def test_functions_without_code_are_named():
 def test_a_divisor_of_two_products_is_divided_by_once():
     """That of a single product is not inverted first, which would round twice."""
     below = Sin(X) + Y
-    twice = "\n".join(assignments(["a", "b"], [X / below, Y / below]))
-    assert twice.count("/") == 1
-    once = "\n".join(assignments(["a", "b"], [X / below, Y * X]))
-    assert once.count("/") == 1
-    assert "1.0/" not in once
+    twice, once = (str(assignments([get("a"), get("b")], [X / below, each])) for each in (Y / below, Y * X))
+    assert twice.count("'/'") == once.count("'/'") == 1
+    assert "('/', 1.0," not in once
 
 
-def test_text_does_not_depend_on_what_was_computed_before():
+def test_the_code_does_not_depend_on_what_was_computed_before():
     """It is a key of the cache of compiled code."""
     code = (
         "from hybrid.expression.nodes import Symbol; from hybrid.expression.operations import *\n"
-        "from hybrid.expression.code import assignments\n"
+        "from hybrid.compiler.statements.code import get\n"
+        "from hybrid.compiler.statements.values import assignments\n"
         "x, y, z, w = map(Symbol, ('x[10]', 'x[2]', 'p[0]', 'w'))\n"
-        "print(assignments(['a'], [Sin(x*y + w) + x*Cos(y*z) - z**2*w + Exp(x - y)*Sin(y) + 0.3*w*y]))"
+        "sum = Sin(x*y + w) + x*Cos(y*z) - z**2*w + Exp(x - y)*Sin(y) + 0.3*w*y\n"
+        "print(assignments([get('a')], [sum]))"
     )
     before = (
         "",
@@ -162,3 +157,17 @@ def test_text_does_not_depend_on_what_was_computed_before():
         for each in before
     }
     assert len(found) == 1
+
+
+def test_constants_have_one_name_each_and_numbers_are_numbers():
+    constants = Constants()
+    numbers = (2, -1.5, Fraction(1, 4), math.pi)
+    assert [constants.name(number(each)) for each in numbers] == [*map(float, numbers)]
+    assert constants.statements() == []
+    names = [constants.name(each) for each in (X * Y, X, X * Y, 2 * X)]
+    assert names[0] == names[2]
+    out = np.zeros(3)
+    stores = [put(entry("out", i), name) for i, name in enumerate(names[1:])]
+    statements = [*constants.statements(), *stores]
+    interpreted([((), statements)], VECTOR_SIGNATURE)(0, 0.0, np.array([3.0, 5.0]), np.zeros(0), out)
+    assert [*out] == [3.0, 15.0, 6.0]
