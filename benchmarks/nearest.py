@@ -16,6 +16,7 @@ NEAREST = {
         "compiler/cache/test_store.py",
     ),
     "hybrid/compiler/cache/seal.py": ("compiler/cache/test_folder.py",),
+    "hybrid/compiler/cases.py": ("compiler/test_emit.py", "compiler/statements/test_rolled.py"),
     "hybrid/compiler/emit.py": ("expression/test_continuity.py",),
     "hybrid/compiler/emitted.py": (
         "compiler/bounds/test_forcing.py",
@@ -62,6 +63,11 @@ NEAREST = {
         "compiler/test_emit.py",
         "solvers/test_taylor.py",
     ),
+    "hybrid/compiler/statements/code.py": (
+        "compiler/llvm/test_lowering.py",
+        "compiler/statements/test_values.py",
+    ),
+    "hybrid/compiler/statements/order.py": ("compiler/statements/test_rolled.py",),
     "hybrid/compiler/steep.py": ("simulation/test_infinite_slopes.py", "compiler/test_surfaces.py"),
     "hybrid/compiler/taylor/linear.py": ("compiler/taylor/test_series.py", "simulation/test_simulate.py"),
     "hybrid/compiler/taylor/loops.py": ("compiler/taylor/test_series.py",),

@@ -12,7 +12,8 @@ class Order:
     """How many statements each statement waits for, one after the other.
 
     A statement waits for those before it that write what it reads or writes, and for those that read what it
-    writes. Columns that are counted from a variable lie apart from those that are numbers.
+    writes. Columns that are counted from a variable lie apart from those that are numbers, and those of four
+    numbers apart from those of single ones.
     """
 
     def __init__(self, whole: Mapping[str, int]) -> None:

@@ -1,12 +1,13 @@
 """The compiled second derivative of guards along a vector and time."""
 
-import math
-
 import numpy as np
 import pytest
 
 from hybrid.compiler.curvature import UNKNOWN, curvature
+from hybrid.compiler.llvm.lowering import VECTOR_SIGNATURE
+from hybrid.compiler.statements.code import at, put
 from hybrid.expression.tracing import model_symbols, trace
+from tests.hybrid.code import interpreted
 
 GUARDS = {
     "quadratic": lambda t, x, p: x.a**2 - p.c * x.a * x.b + t * x.b,
@@ -22,7 +23,7 @@ GUARDS = {
 def test_curvature(name):
     symbols = model_symbols(2, 1)
     [guard] = trace(GUARDS[name], ("a", "b"), ("c",))
-    lines = "\n".join(curvature(guard, False, symbols))
+    run = interpreted([((), curvature(guard, False, symbols))], VECTOR_SIGNATURE)
     rng = np.random.default_rng(1)
     for _ in range(5):
         t, x, p, v = rng.uniform(0.2, 1.0), rng.uniform([1.0, 0.1], [2.0, 0.9]), [0.7], rng.normal(size=2)
@@ -32,7 +33,7 @@ def test_curvature(name):
             return GUARDS[name](t + s, point, type("Parameters", (), {"c": p[0]}))
 
         out = np.array(v)
-        exec(lines, {**vars(math), "t": t, "x": x, "p": p, "out": out})
+        run(0, t, x, np.array(p), out)
         h = 1e-4
         assert out[0] == pytest.approx((along(h) - 2.0 * along(0.0) + along(-h)) / h**2, rel=1e-5, abs=1e-5)
 
@@ -43,11 +44,12 @@ def test_a_difference_is_taken_before_its_multiple():
     [guard] = trace(lambda t, x, p: 1.5 * (x.a - x.b) * t**2, ("a", "b"), ())
     u = np.finfo(float).eps
     out = np.zeros(2)
-    exec("\n".join(curvature(guard, False, symbols)), {"t": 0.7, "x": [1.0 + u, 1.0], "out": out})
+    run = interpreted([((), curvature(guard, False, symbols))], VECTOR_SIGNATURE)
+    run(0, 0.7, np.array([1.0 + u, 1.0]), np.zeros(0), out)
     assert out[0] == 3.0 * u
 
 
 def test_affine_guards_have_none_and_opaque_ones_an_unknown_one():
     symbols = model_symbols(2, 0)
-    assert curvature(symbols.x[0], True, symbols) == ["out[0] = 0.0"]
+    assert curvature(symbols.x[0], True, symbols) == [put(at("out", 0), 0.0)]
     assert curvature(None, False, symbols) == UNKNOWN

@@ -102,7 +102,7 @@ class Writer:
         entry, four, number, lanes = self.entry(), self.four(), self.number(3), self.lanes(2)
         mark, left = next(self.fresh), self.varying(13)
         name, pair = self.name(NUMBERS), lambda i: several([get(LANES[left(i)]), get(LANES[left(i) + 1])])
-        set_v = [lambda i, v=v, at=at: put(get(v), at) for v, at in (("v", FROM_V + 1), ("w", FROM_W + 4))]
+        set_v = lambda i: put(get("v"), FROM_V + 1), lambda i: put(get("w"), FROM_W + 4)
         return self.choice(
             [lambda i: put(name(i), number(i))],
             [lambda i: put(at("out", *entry(i)), number(i))],
