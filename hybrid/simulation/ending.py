@@ -199,7 +199,8 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     if code in (StatusCode.INTERRUPTED, StatusCode.OUT_OF_MEMORY):
         return run_status(code, _place(trajectory), None, bare_time=False)
     run = trajectory.run
-    singular, ambiguous = run.singular_jumps, run.order_mattered
+    singular = run.singular_jumps
+    ambiguous = 0 if trajectory.system.listed_order else run.order_mattered
     grazed = run.ill_conditioned if trajectory.tangents else 0
     if trajectory.tangents and singular:
         return Status(
@@ -235,7 +236,8 @@ def _status(trajectory: Trajectory, code: int) -> Status:
             StatusCode.AMBIGUOUS_ORDER,
             f"{ambiguous} times two guards were reached together and the order of their transitions "
             f"mattered; the one listed first was fired first.{also}",
-            "Choose the order in which the transitions are listed, or add one for the corner.",
+            "Choose the order in which the transitions are listed and declare "
+            "HybridSystem(listed_order=True), or add one for the corner.",
         )
     if code == codes.DONE and grazed:
         return _grazed(trajectory, grazed)

@@ -45,6 +45,10 @@ def _as_counters(value: Any) -> tuple[str, ...]:
     return as_names(value, "counters")
 
 
+def _as_listed_order(value: object) -> bool:
+    return arguments.flag("HybridSystem: listed_order", value)
+
+
 def _as_period(value: Any) -> Any:
     if value is None or callable(value):
         return value
@@ -102,6 +106,9 @@ class HybridSystem(Portable):
         Default values by name; any call may override them.
     modes, transitions
         Nodes and edges. If guards are crossed at the same time, the transition listed first fires.
+    listed_order
+        Whether the order of ``transitions`` is meant to decide where guards are reached together. Otherwise
+        the status of a run says AMBIGUOUS_ORDER if another order would have led elsewhere.
     start
         Name of the mode that a run starts in if the call names none. In a system that has been split it may
         be a mode from before: the run starts in the part that the state lies in.
@@ -177,6 +184,8 @@ class HybridSystem(Portable):
     parameters: Mapping[str, float] = attrs.field(factory=dict, kw_only=True, converter=as_parameters)
     modes: tuple[Mode, ...] = attrs.field(kw_only=True, converter=_as_modes)
     transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=_as_transitions)
+    # It decides no result, but what the status says of one.
+    listed_order: bool = attrs.field(default=False, kw_only=True, converter=_as_listed_order, repr=False)
     period: Period = attrs.field(default=None, kw_only=True, converter=_as_period)
     start: str | None = attrs.field(default=None, kw_only=True)
     name: str = attrs.field(default="", kw_only=True, validator=_name)
