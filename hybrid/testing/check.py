@@ -230,7 +230,7 @@ def _properties(
         ANGLES: bool(system.angles),
         LANDINGS: any(each.reset is not None for each in system.transitions),
         LIMITS: any(each.accumulates_to for each in system.transitions),
-        ORDER: len(system.transitions) > 1,
+        ORDER: len(system.transitions) > 1 and not system.listed_order,
     }
     properties = {name: check for name, check in properties.items() if applies.get(name, True)}
     if flip is not None:

@@ -146,16 +146,24 @@ def go_to_tick(model, run, transition):
 
 
 @njit(**KERNEL)
+def ticks_now(model, run, transition):
+    """Whether the next tick of a clock is at this instant, or has been missed by rounding."""
+    k = number_of_tick(model, run, transition)
+    return time_to_tick(model, run, transition, k) <= rounding_of_tick(model, run, transition, k)
+
+
+@njit(**KERNEL)
 def ticking(model, run, work):
-    """The first listed of the clocks that tick now and may fire; ticks that may not are passed over."""
-    mode = run.mode
-    for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
+    """The first listed of the clocks that tick now and may fire; if none may, the ticks are passed over.
+
+    Copies of a transition share their ticks, so none is passed over before all have been asked.
+    """
+    first, last = model.first_clock[run.mode], model.first_clock[run.mode + 1]
+    for slot in range(first, last):
         transition = model.clocks[slot]
-        k = number_of_tick(model, run, transition)
-        left = time_to_tick(model, run, transition, k)
-        if left > rounding_of_tick(model, run, transition, k):
-            continue
-        if allowed(model, transition, run.phase, run.y, work.scalar):
+        if ticks_now(model, run, transition) and allowed(model, transition, run.phase, run.y, work.scalar):
             return transition
-        pass_tick(model, run, transition, False)
+    for slot in range(first, last):
+        if ticks_now(model, run, model.clocks[slot]):
+            pass_tick(model, run, model.clocks[slot], False)
     return NO_TRANSITION

@@ -168,6 +168,21 @@ def test_a_sample_is_taken_in_the_mode_that_a_slower_clock_enters():
         assert len(arc.jumps) == 24
 
 
+def test_a_reset_that_may_land_in_several_parts_misses_no_tick():
+    """Each part is a copy of the transition with a condition; the copies share their ticks."""
+    kicked = Transition("m", "m", Every(1.0), Reset(lambda t, x, p: {"v": x.v + 1.0, "n": x.n + 1}))
+    pieces = hybrid.split(
+        HybridSystem(
+            state=("v",),
+            counters=("n",),
+            modes=[Mode("m", lambda t, x, p: (-0.5 * np.sign(x.v),))],
+            transitions=[kicked],
+        )
+    )
+    for start in (-20.3, -2.3, -0.3, 0.3):
+        assert hybrid.simulate(pieces, {"v": start}, (0.0, 12.5))["n"][-1] == 12.0
+
+
 def test_clocks_in_a_system_that_is_split():
     """Crossing a kink neither enters the mode anew nor makes a clock tick twice."""
     field = Mode("m", lambda t, x, p: (np.cos(t) + 0.1 * np.abs(x.q), 0.0))
