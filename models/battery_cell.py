@@ -82,7 +82,7 @@ def battery_cell() -> HybridSystem:
     )  # fmt: skip
 
 
-_SHARE = Table(*zip(*CYCLE, strict=True))
+_SHARE = Table([time for time, _ in CYCLE], [share for _, share in CYCLE])
 
 
 def _current(t, p):

@@ -57,8 +57,8 @@ def refractory_neuron() -> HybridSystem:
             "tau": 10.0, "u_rest": -65.0, "R": 10.0, "I": 2.0, "theta": -50.0, "u_r": -65.0, "t_ref": 4.0,
         },
         units={
-            "u": "mV", "n": "1", "t": "ms", "tau": "ms", "u_rest": "mV", "R": "Mohm", "I": "nA", "theta": "mV",
-            "u_r": "mV", "t_ref": "ms",
+            "u": "mV", "n": "1", "t": "ms", "tau": "ms", "u_rest": "mV", "R": "Mohm", "I": "nA",
+            "theta": "mV", "u_r": "mV", "t_ref": "ms",
         },
         modes=[Mode("integrate", _integrate), Mode("refractory", _hold)],
         transitions=[
