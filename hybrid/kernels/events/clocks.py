@@ -18,7 +18,7 @@ from hybrid.kernels.arithmetic.clock import (
 )
 from hybrid.kernels.arithmetic.tables import knots_passed
 from hybrid.kernels.events.guards import allowed
-from hybrid.kernels.types.codes import AFTER, AT, EVERY, NO_TRANSITION
+from hybrid.kernels.types.codes import AFTER, AT, EVERY, NO_MODE, NO_TRANSITION
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -81,12 +81,21 @@ def first_from(model, run, transition, beyond):
         k += 1
 
 
+@njit(**INLINE)
+def leads_to_part(model, transition):
+    """Whether a transition leads to another part of its mode."""
+    onward = model.target[transition] != NO_MODE and model.marker[transition] == 0
+    return onward and model.enters[transition] == 0
+
+
 @njit(**KERNEL)
 def wind(model, run):
     """Wind up the clocks of the mode that has just been entered.
 
     A tick of this instant is still ahead, unless the transition has fired at it or the run starts here. If
-    another mode was left at a tick of the same clock, that was its tick: two modes may take turns.
+    another mode was left at a tick of the same clock, that was its tick: two modes may take turns. From part
+    to part of a mode that has been split, a tick at the start fires as well: the run has begun in the part
+    that ends there.
     """
     mode, starts = run.mode, run.last_fired == NO_TRANSITION
     entered = starts or model.enters[run.last_fired] == 1
@@ -99,7 +108,8 @@ def wind(model, run):
         if model.clock[transition] == AFTER:
             run.tick[own] = 0 if entered else run.tick[own]
             continue
-        run.tick[own] = max(run.tick[own], first_from(model, run, transition, starts))
+        ahead = starts and not leads_to_part(model, transition)
+        run.tick[own] = max(run.tick[own], first_from(model, run, transition, ahead))
         if moved:
             run.tick[own] = max(run.tick[own], run.ticked[model.clock_of[transition]])
 
