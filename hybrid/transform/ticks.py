@@ -12,7 +12,7 @@ from hybrid.expression.derivatives import derivative
 from hybrid.expression.evaluation import scalar
 from hybrid.expression.graph import replaced
 from hybrid.expression.nodes import ZERO, Expression, number
-from hybrid.expression.operations import Absolute, Floor, Less, LessEqual, Maximum, Minimum
+from hybrid.expression.operations import Absolute, Floor, Less, LessEqual, Maximum, Minimum, Select
 from hybrid.expression.surfaces import Surfaces, is_negative
 from hybrid.system.clocks import Every
 from hybrid.system.elements import Function
@@ -59,7 +59,7 @@ def timed(surfaces: Surfaces, place: int) -> Timed | None:
     """A surface of the time alone that cuts a sawtooth; None for any other.
 
     The fraction of a growing argument leaves the part below its cut at the cut, and the part above it where
-    the argument is whole.
+    the argument is whole; that of a falling one the other way round.
     """
     sawtooth = surfaces.sawtooth(place)
     if sawtooth is None or not surfaces.is_timed(sawtooth.argument):
@@ -68,21 +68,25 @@ def timed(surfaces: Surfaces, place: int) -> Timed | None:
     if is_negative(by):
         over, by, cut = -over, -by, -cut
     rate = derivative(over, t)
-    falls = is_negative(rate)
-    period = by / (-rate if falls else rate)
+    # A parameter in ``by`` has to be positive, which the clock checks; one in the rate may have either sign.
+    period = Absolute(by / rate) if by.is_number else by / Absolute(rate)
     # A cut beyond the sawtooth never comes: the fraction stays below it, or above it.
     within = cut if cut.is_number else Minimum(Maximum(cut, ZERO), by)
-    ends = {
-        side: ((ZERO if (side == sawtooth.above) != falls else within) - replaced(over, {t: ZERO})) / rate
-        for side in (-1, 1)
-    }
+    start = replaced(over, {t: ZERO})
+    above, below = ((place - start) / rate for place in (ZERO, within))
+    ends = {sawtooth.above: _directed(rate, above, below), -sawtooth.above: _directed(rate, below, above)}
     # A little later, so that rounding does not make the instant at which a side ends a part of it.
-    later = ROUNDING * (Absolute(t / period) + Absolute(over / by))
-    u = over / by - later if falls else over / by + later
-    fraction = u - Floor(u)
-    beyond = Less(fraction, within / by) if falls else LessEqual(within / by, fraction)
-    upper = 2 * beyond - 1
-    return Timed(period, ends, sawtooth.above * (-upper if falls else upper))
+    u, later = over / by, ROUNDING * (Absolute(t / period) + Absolute(over / by))
+    grown, fallen = (each - Floor(each) for each in (u + later, u - later))
+    exceeds = _directed(rate, LessEqual(within / by, grown), LessEqual(within / by, fallen))
+    return Timed(period, ends, sawtooth.above * (2 * exceeds - 1))
+
+
+def _directed(rate: Expression, growing: Expression, falling: Expression) -> Expression:
+    """One of two expressions, by the direction in which an argument passes."""
+    if rate.is_number:
+        return falling if rate.value < 0 else growing
+    return Select(Less(rate, ZERO), falling, growing)
 
 
 def _quantity(value: Expression, names: Mapping[Any, str]) -> Any:

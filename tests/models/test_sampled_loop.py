@@ -38,7 +38,7 @@ def test_the_multipliers():
     matrix = np.array([[PHI - g * k, g, -g * P["Kp"]], [-k, 1.0, -P["Kp"]], [-1.0, 0.0, 0.0]])
     expected = sorted(np.linalg.eigvals(matrix), key=lambda m: (abs(m), m.imag))
     found = sorted(orbit.multipliers, key=lambda m: (abs(m), m.imag))
-    np.testing.assert_allclose(found, expected, atol=1e-9)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
     np.testing.assert_allclose(orbit.x0, (1.0, 1.0, 0.0), atol=1e-12)
 
 

@@ -181,6 +181,17 @@ def test_beside_a_clock_of_the_users():
     assert arc["q"][-1] == pytest.approx(1 + (mapped(100, 0.3, 0.4) - 1) * np.exp(-0.1), abs=1e-12)
 
 
+@pytest.mark.parametrize("w", [2.0, -2.0, 0.37])
+def test_a_frequency_of_either_sign(w):
+    """A falling phase is on for the same share, at the other end of its turns."""
+    field = lambda t, x, p: (np.where(np.mod(p.w * t, 1.0) < 0.3, 1.0, 0.0),)  # noqa: E731
+    system = from_equations(field, state=("q",), parameters={"w": 1.0})
+    assert len(system.modes) == 2
+    arc = simulate(system, (0.0,), (0.0, 8 / abs(w)), parameters={"w": w})
+    assert arc.x[-1, 0] == pytest.approx(8 * 0.3 / abs(w), abs=1e-13)
+    assert arc.jumps.t[0] == pytest.approx((0.3 if w > 0 else 0.7) / abs(w), rel=1e-15)
+
+
 def test_a_period_that_is_not_positive_is_refused():
     with pytest.raises(hybrid.ArgumentError, match=r"period must be positive and finite; got -0\.3"):
         simulate(pulsed(DUTIES["remainder of t by T"]), (0.0,), (0.0, 1.0), parameters={"T": -0.3})
