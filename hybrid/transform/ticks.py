@@ -12,7 +12,7 @@ from hybrid.expression.derivatives import derivative
 from hybrid.expression.evaluation import scalar
 from hybrid.expression.graph import replaced
 from hybrid.expression.nodes import ZERO, Expression, number
-from hybrid.expression.operations import Absolute, Floor, Less, LessEqual, Maximum, Minimum, Select
+from hybrid.expression.operations import Absolute, Ceiling, Floor, Less, LessEqual, Maximum, Minimum, Select
 from hybrid.expression.surfaces import Surfaces, is_negative
 from hybrid.system.clocks import Every
 from hybrid.system.elements import Function
@@ -77,8 +77,8 @@ def timed(surfaces: Surfaces, place: int) -> Timed | None:
     ends = {sawtooth.above: _directed(rate, above, below), -sawtooth.above: _directed(rate, below, above)}
     # A little later, so that rounding does not make the instant at which a side ends a part of it.
     u, later = over / by, ROUNDING * (Absolute(t / period) + Absolute(over / by))
-    grown, fallen = (each - Floor(each) for each in (u + later, u - later))
-    exceeds = _directed(rate, LessEqual(within / by, grown), LessEqual(within / by, fallen))
+    grown, fallen = u + later - Floor(u + later), u - later - Ceiling(u - later) + 1
+    exceeds = _directed(rate, LessEqual(within / by, grown), Less(within / by, fallen))
     return Timed(period, ends, sawtooth.above * (2 * exceeds - 1))
 
 
