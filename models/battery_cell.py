@@ -49,8 +49,8 @@ def battery_cell() -> HybridSystem:
 
     References
     ----------
-    G. L. Plett, Battery Management Systems, volume 1: Battery Modeling, Artech House, 2015, section 2.3
-    (the Thevenin model).
+    G. L. Plett, Battery Management Systems, volume 1: Battery Modeling, Artech House, 2015, chapter 2
+    (equivalent circuits).
 
     Examples
     --------

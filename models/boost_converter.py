@@ -43,7 +43,7 @@ def boost_converter() -> HybridSystem:
     J. H. B. Deane, "Chaos in a current-mode controlled boost dc-dc converter", IEEE Transactions on Circuits
     and Systems I 39(8), 680-683, 1992, doi:10.1109/81.168922. The slope compensation: C. W. Deisch, "Simple
     switching control method changes power converter into a current source", IEEE Power Electronics
-    Specialists Conference, 300-306, 1978, doi:10.1109/PESC.1978.7072368.
+    Specialists Conference, 300-306, 1978.
 
     Examples
     --------
