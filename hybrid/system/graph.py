@@ -22,7 +22,7 @@ from hybrid.system.laws import Laws, placed
 from hybrid.system.periodicity import Period, period_at
 from hybrid.system.portable import Portable
 from hybrid.system.switching import switching_inside
-from hybrid.system.variables import Variables, as_names, as_parameters, as_state
+from hybrid.system.variables import Variables, as_counters, as_held, as_parameters, as_state
 from hybrid.system.watched import Watched
 
 if TYPE_CHECKING:
@@ -35,14 +35,6 @@ def _as_modes(value: Iterable[Mode]) -> tuple[Mode, ...]:
 
 def _as_transitions(value: Iterable[Transition]) -> tuple[Transition, ...]:
     return tuple(arguments.items("HybridSystem: transitions", value, "be a list of Transition objects"))
-
-
-def _as_held(value: Any) -> tuple[str, ...]:
-    return as_names(value, "held")
-
-
-def _as_counters(value: Any) -> tuple[str, ...]:
-    return as_names(value, "counters")
 
 
 def _as_listed_order(value: object) -> bool:
@@ -179,8 +171,8 @@ class HybridSystem(Portable):
     """
 
     state: tuple[str, ...] | int = attrs.field(kw_only=True, converter=as_state)
-    held: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=_as_held)
-    counters: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=_as_counters)
+    held: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=as_held)
+    counters: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=as_counters)
     parameters: Mapping[str, float] = attrs.field(factory=dict, kw_only=True, converter=as_parameters)
     modes: tuple[Mode, ...] = attrs.field(kw_only=True, converter=_as_modes)
     transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=_as_transitions)

@@ -296,8 +296,17 @@ def as_state(value: Any) -> tuple[str, ...] | int:
     return names
 
 
-def as_names(value: Any, what: str) -> tuple[str, ...]:
-    """Names of held components or of counters; ``what`` is the argument."""
+def as_held(value: Any) -> tuple[str, ...]:
+    """Names of held components."""
+    return _as_names(value, "held")
+
+
+def as_counters(value: Any) -> tuple[str, ...]:
+    """Names of counters."""
+    return _as_names(value, "counters")
+
+
+def _as_names(value: Any, what: str) -> tuple[str, ...]:
     if isinstance(value, str) or (
         not isinstance(value, Sequence) and not (isinstance(value, np.ndarray) and value.ndim == 1)
     ):

@@ -157,23 +157,26 @@ def go_to_tick(model, run, transition):
 
 @njit(**KERNEL)
 def ticks_now(model, run, transition):
-    """Whether the next tick of a clock is at this instant, or has been missed by rounding."""
+    """Whether the next tick of a clock is at this instant."""
     k = number_of_tick(model, run, transition)
     return time_to_tick(model, run, transition, k) <= rounding_of_tick(model, run, transition, k)
 
 
 @njit(**KERNEL)
 def ticking(model, run, work):
-    """The first listed of the clocks that tick now and may fire; if none may, the ticks are passed over.
+    """The first listed of the clocks that tick now and may fire; ticks that may not are passed over.
 
-    Copies of a transition share their ticks, so none is passed over before all have been asked.
+    Copies of one transition have one tick, which is not passed over if one of them may fire.
     """
-    first, last = model.first_clock[run.mode], model.first_clock[run.mode + 1]
+    first, last, fires = model.first_clock[run.mode], model.first_clock[run.mode + 1], NO_TRANSITION
     for slot in range(first, last):
         transition = model.clocks[slot]
         if ticks_now(model, run, transition) and allowed(model, transition, run.phase, run.y, work.scalar):
-            return transition
+            last, fires = slot, transition
+            break
     for slot in range(first, last):
-        if ticks_now(model, run, model.clocks[slot]):
-            pass_tick(model, run, model.clocks[slot], False)
-    return NO_TRANSITION
+        transition = model.clocks[slot]
+        copy = fires != NO_TRANSITION and model.tick_of[transition] == model.tick_of[fires]
+        if not copy and ticks_now(model, run, transition):
+            pass_tick(model, run, transition, False)
+    return fires
