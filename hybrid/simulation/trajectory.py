@@ -21,6 +21,7 @@ from hybrid.simulation.plan import Plan, check_solver, plan_of
 from hybrid.solvers import Solver
 from hybrid.system.graph import HybridSystem, as_system, starting_mode
 from hybrid.system.growth import Unexplored
+from hybrid.transform.aged import aged, has_age, with_age
 
 
 def start(
@@ -42,7 +43,8 @@ def start(
     Without a ``mode`` the system says where a run starts. The guards do if it does not, or with
     ``by_guards``.
 
-    ``tangent`` is an ``(n, k)`` matrix of tangent vectors, or None for a run without any. ``time`` is the
+    ``tangent`` is an ``(n, k)`` matrix of tangent vectors, or None for a run without any. With them the run
+    is one of the aged system, in which they know when a mode was entered. ``time`` is the
     name of the argument that ``t0`` comes from, ``horizon`` how long the run takes, 0 if that is not known,
     ``stop`` who may end the run early.
     """
@@ -52,6 +54,9 @@ def start(
     mode = mode if by_guards else starting_mode(system, mode)
     if system.growth is not None:
         explore(system, t0, state, system.parameter_values(parameters), mode)
+    if tangent is not None:
+        state, tangent = with_age(system, state), with_age(system, tangent.T).T
+        system = aged(system)
     common = Common(compile_system(system), check_solver(solver), tangent, t0, time, horizon, stop)
     return common.begin(state, mode, lambda plan, memory: common.compiled.given(parameters, plan.model))
 
@@ -104,7 +109,10 @@ class Common:
             choose_mode(compiled.system, plan.parts_so_far, model, memory.run, memory.work, mode)
         memory.run.mode = index
         most = self.solver.max_steps
-        return Trajectory(compiled, plan, model, memory, tangents, most, phase0, beyond, self.stop)
+        made = Trajectory(compiled, plan, model, memory, tangents, most, phase0, beyond, self.stop)
+        if tangents and compiled.system.age is not None:
+            made.replace_tangents(made.tangent_matrix)
+        return made
 
 
 @attrs.frozen(eq=False)
@@ -183,7 +191,12 @@ class Trajectory:
         return self.run.y[n:].reshape(self.tangents, n)[:, : self.system.tangent_dimension].T.copy()
 
     def replace_tangents(self, matrix: np.ndarray) -> None:
-        """Go on with other tangent vectors, the columns of ``(n, k)``."""
+        """Go on with other tangent vectors, the columns of ``(n, k)``.
+
+        Where the age of the mode counts for nothing, they have no part along it.
+        """
+        if self.system.age is not None and not has_age(self.system, self.mode):
+            matrix = matrix * (np.arange(len(matrix)) != self.system.age)[:, None]
         put_tangents(self.run.y, self.model.dimension, matrix)
         if self.run.stage == codes.READY:
             self.run.stage = codes.STALE

@@ -282,6 +282,19 @@ class HybridSystem(Portable):
         return tuple(accumulate(counts, initial=0))
 
     @cached_property
+    def aging(self) -> frozenset[str]:
+        """Names of the modes, or of those that they are parts of, whose clocks count from the entry."""
+        whole = {mode.name: mode.part_of or mode.name for mode in self.modes}
+        return frozenset(
+            whole[each.source] for each in self.transitions if each.clock and each.clock.counts_from_entry
+        )
+
+    @cached_property
+    def age(self) -> int | None:
+        """The component of the state that is the time since the entry of the mode, if there is one."""
+        return next((each.clock.age for each in self.transitions if each.clock and each.clock.age), None)
+
+    @cached_property
     def graph(self) -> nx.MultiDiGraph:
         """The modes and transitions as a networkx graph, to inspect, check or draw.
 
@@ -412,6 +425,15 @@ def ticks_of(system: HybridSystem, x: np.ndarray, parameters: np.ndarray) -> lis
                 raise ArgumentError(f"{owner}: {fault} with these parameters.")
             found += numbers
     return found
+
+
+def enters_anew(system: HybridSystem, transition: Transition) -> bool:
+    """Whether a transition enters its target anew: not if it marks, or leads to another part of its mode."""
+    if transition.target is None or transition.is_marker:
+        return False
+    source, target = map(system.mode_index, (transition.source, transition.target))
+    whole, other = system.modes[source].part_of, system.modes[target].part_of
+    return transition.part_of is not None or whole is None or whole != other
 
 
 def check_mode(system: HybridSystem, name: object, what: str = "Mode") -> None:

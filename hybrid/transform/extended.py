@@ -89,9 +89,9 @@ class _Extension:
         if isinstance(guard, Clock):
 
             def numbers(x: Any, p: Any, clock: Clock = guard) -> tuple[Any, ...]:
-                return numbers_of(clock, x, self._all_parameters(x, p))
+                return numbers_of(clock, self._own(x), self._all_parameters(x, p))
 
-            moved = DerivedClock(guard, numbers, when)
+            moved = DerivedClock(guard, numbers, when, guard.age)
         else:
             moved = Guard(self._function(guard.function), guard.direction, when=when, at_start=guard.at_start)
         return attrs.evolve(transition, guard=moved, reset=new)
@@ -122,13 +122,11 @@ class _Extension:
 
     def _function(self, function: Callable[..., Any]) -> Callable[..., Any]:
         """A function of the original system as one of the extended state."""
+        return lambda t, x, p: function(t, self._own(x), self._all_parameters(x, p))
+
+    def _own(self, x: Any) -> Any:
+        """The state of the original system."""
         original, first, last = self.original, self.first, self.last
-
-        def called(t: Any, x: Any, p: Any) -> Any:
-            if isinstance(original.state, int):
-                own = x[:first]
-            else:
-                own = named_values(STATE, original.state_names, (*x[:first], *x[last:]))
-            return function(t, own, self._all_parameters(x, p))
-
-        return called
+        if isinstance(original.state, int):
+            return x[:first]
+        return named_values(STATE, original.state_names, (*x[:first], *x[last:]))

@@ -81,6 +81,15 @@ def first_from(model, run, transition, beyond):
         k += 1
 
 
+@njit(**IN_ORDER)
+def keep_entry(model, run, starts):
+    """Keep the time at which the mode has been entered; where a run ``starts``, its state tells that."""
+    run.entry_cycle, run.entry_phase, run.entry_low = run.cycle, run.phase, run.phase_low
+    if starts and model.age >= 0:
+        run.entry_phase, lost = sum_in_two_parts(run.phase, -run.y[model.age])
+        run.entry_low += lost
+
+
 @njit(**KERNEL)
 def wind(model, run):
     """Wind up the clocks of the mode that has just been entered.
@@ -92,7 +101,7 @@ def wind(model, run):
     entered = starts or model.enters[run.last_fired] == 1
     moved = not starts and model.whole_mode[run.previous_mode] != model.whole_mode[mode]
     if entered:
-        run.entry_cycle, run.entry_phase, run.entry_low = run.cycle, run.phase, run.phase_low
+        keep_entry(model, run, starts)
     for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
         transition = model.clocks[slot]
         own = model.tick_of[transition]
