@@ -25,6 +25,7 @@ from hybrid.system.variables import STATE, named_values
 AGE = "age"
 
 _AGED: WeakKeyDictionary[HybridSystem, HybridSystem] = WeakKeyDictionary()
+_ORIGINALS: WeakKeyDictionary[HybridSystem, HybridSystem] = WeakKeyDictionary()
 
 
 def aged(system: HybridSystem) -> HybridSystem:
@@ -38,7 +39,13 @@ def aged(system: HybridSystem) -> HybridSystem:
         return system
     if system not in _AGED:
         _AGED[system] = _Aging(system).system()
+        _ORIGINALS[_AGED[system]] = system
     return _AGED[system]
+
+
+def original_of(system: HybridSystem) -> HybridSystem:
+    """The system whose aged one this is; itself if there is none."""
+    return _ORIGINALS.get(system, system)
 
 
 def with_age(system: HybridSystem, x: np.ndarray) -> np.ndarray:

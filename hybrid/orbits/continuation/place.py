@@ -19,6 +19,7 @@ from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver
 from hybrid.system.graph import refuse_counters
+from hybrid.transform.aged import aged, with_age
 
 # A step may turn by this angle (its cosine).
 LEAST_COSINE = 0.95
@@ -236,6 +237,10 @@ def place_on(orbit: Any, names: tuple[str, ...], sizes: np.ndarray, solver: Solv
         If the orbit is not found again, or its system has counters.
     """
     refuse_counters(orbit.system, "Continuation")
+    if orbit.transitions:
+        # Without a jump no mode is entered, and the age has no value to return to.
+        x0 = with_age(orbit.system, orbit.x0)
+        orbit = attrs.evolve(orbit, system=aged(orbit.system), x0=x0)
     family = Family(orbit.system, names, dict(orbit.parameters), orbit.forcing_periods, solver, ())
     arc, values = orbit.arc(solver), np.array([orbit.parameters[name] for name in names])
     started = start_of(family, arc, orbit.period, values) if arc.status.ok else None

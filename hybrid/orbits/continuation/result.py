@@ -8,7 +8,7 @@ import numpy as np
 from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import moment, share_of
 from hybrid.orbits.continuation.route import Route
-from hybrid.orbits.orbit import PeriodicOrbit, turns_over
+from hybrid.orbits.orbit import PeriodicOrbit, turns_over, unaged
 from hybrid.status import SUCCESS
 
 
@@ -37,6 +37,12 @@ class Points:
 
 def orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
     """The orbit as a result, from the point that stands for it."""
+    [found] = unaged([whole_orbit_of(orbit, points)])
+    return found
+
+
+def whole_orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
+    """The orbit from the point that stands for it, with the age if the family has one."""
     family, loop = orbit.family, orbit.loop
     i, share = points.at(orbit)
     (t, x), mode = moment(orbit, i, share), mode_at(orbit, i, share)
