@@ -19,7 +19,8 @@ from hybrid.simulation.labelled import Names, attributes, with_counters
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.growth import growing
-from lyapunov.spectrum import first_vectors, interval_length
+from hybrid.transform.aged import aged
+from lyapunov.spectrum import generic_directions, interval_length
 
 if TYPE_CHECKING:
     import xarray
@@ -180,7 +181,8 @@ def covariant_vectors(
     >>> bool(abs(found.exponents[0] - 0.5) < 1e-6)
     True
     """
-    basis = first_vectors(system, None)
+    n = aged(system).tangent_dimension
+    basis = generic_directions(n, n)
     intervals = arguments.count("intervals", intervals, 1)
     transient = arguments.count("transient", transient, 0)
     progress = arguments.flag("progress", progress)

@@ -16,6 +16,7 @@ from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
+from hybrid.transform.aged import aged, least_dimension
 from lyapunov.spectrum import interval_length
 
 STARTS = "be a state (n,) or states of shape (N, n)"
@@ -82,7 +83,7 @@ def finite_time_exponents(
     one = starts.ndim == 1
     if not one:
         _check(system, starts)
-    found = np.full((1 if one else len(starts), count, system.tangent_dimension), np.nan)
+    found = np.full((1 if one else len(starts), count, least_dimension(system)), np.nan)
     failures = []
     for i, each in enumerate(starts[None] if one else starts):
         try:
@@ -93,7 +94,7 @@ def finite_time_exponents(
                 mode=mode,
                 parameters=parameters,
                 solver=solver,
-                tangent=np.eye(system.tangent_dimension),
+                tangent=np.eye(aged(system).tangent_dimension),
             )
             _fill(found[i], trajectory, interval_length(trajectory, interval, count))
         except HybridError as failure:
@@ -115,9 +116,9 @@ def _check(system: HybridSystem, starts: np.ndarray) -> None:
 
 def _fill(out: np.ndarray, trajectory: Trajectory, length: float) -> None:
     """Write the exponents of intervals of this length into ``out (intervals, n)``."""
-    begin, n = trajectory.t, out.shape[1]
+    begin, units = trajectory.t, np.ones(trajectory.system.tangent_dimension)
     for i in range(len(out)):
-        factors = fundamental_factors(trajectory, begin + (i + 1) * length, np.ones(n))
+        factors = fundamental_factors(trajectory, begin + (i + 1) * length, units)
         whole = all(np.all(np.isfinite(each)) for each in factors.matrices)
         if factors.code != codes.DONE or not whole:
             return
@@ -125,4 +126,4 @@ def _fill(out: np.ndarray, trajectory: Trajectory, length: float) -> None:
         count = len(factors.matrices)
         product = [*factors.matrices, *(each.T for each in reversed(factors.matrices))]
         singular = [*factors.singular, *(2 * count - 1 - k for k in factors.singular)]
-        out[i] = product_eigenvalues(product, singular).log_moduli / (2 * length)
+        out[i] = product_eigenvalues(product, singular).log_moduli[: out.shape[1]] / (2 * length)

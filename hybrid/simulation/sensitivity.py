@@ -15,7 +15,7 @@ from hybrid.simulation.trajectory import start
 from hybrid.solvers import Solver
 from hybrid.status import apart_status
 from hybrid.system.functions import guard_function
-from hybrid.transform.aged import aged, with_age, without_age
+from hybrid.transform.aged import aged, with_age
 from hybrid.transform.extended import extended, with_parameters
 from hybrid.transform.restricted import restricted
 
@@ -141,7 +141,7 @@ def with_sensitivities(
     """
     whole = aged(arc.system)
     system, n, m = extended(whole, names), whole.tangent_dimension, len(names)
-    own = without_age(arc.system, np.arange(n))
+    own = np.arange(arc.system.tangent_dimension)
     begin = with_parameters(
         system, with_age(arc.system, x0), np.array([arc.parameters[name] for name in names])
     )

@@ -54,11 +54,23 @@ def start(
     mode = mode if by_guards else starting_mode(system, mode)
     if system.growth is not None:
         explore(system, t0, state, system.parameter_values(parameters), mode)
-    if tangent is not None:
-        state, tangent = with_age(system, state), with_age(system, tangent.T).T
-        system = aged(system)
+    system, state, tangent = directed(system, state, tangent)
     common = Common(compile_system(system), check_solver(solver), tangent, t0, time, horizon, stop)
     return common.begin(state, mode, lambda plan, memory: common.compiled.given(parameters, plan.model))
+
+
+def directed(
+    system: HybridSystem, state: np.ndarray, tangent: np.ndarray | None
+) -> tuple[HybridSystem, np.ndarray, np.ndarray | None]:
+    """What runs with these tangent vectors: with any, the aged system from a state where a mode is entered.
+
+    Vectors may have a part along the age.
+    """
+    if tangent is None or aged(system) is system:
+        return system, state, tangent
+    if len(tangent) == system.tangent_dimension:
+        tangent = with_age(system, tangent.T).T
+    return aged(system), with_age(system, state), tangent
 
 
 def explore(system: HybridSystem, t0: float, state: np.ndarray, values: np.ndarray, mode: str | None) -> None:

@@ -54,8 +54,8 @@ def with_age(system: HybridSystem, x: np.ndarray) -> np.ndarray:
 
 
 def without_age(system: HybridSystem, x: np.ndarray) -> np.ndarray:
-    """States of the system ``(..., n)`` from states of the aged one."""
-    return np.delete(x, system.tangent_dimension, axis=-1) if aged(system) is not system else x
+    """States of the system ``(..., n)`` from its own or those of the aged one."""
+    return np.delete(x, system.tangent_dimension, axis=-1) if x.shape[-1] > system.dimension else x
 
 
 def has_age(system: HybridSystem, mode: str) -> bool:
