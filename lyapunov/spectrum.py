@@ -265,8 +265,9 @@ def first_vectors(system: HybridSystem, k: int | None) -> np.ndarray:
 
 
 def orthonormal_at_start(trajectory: Trajectory) -> None:
-    """Make the tangent vectors of a run orthonormal again where its first mode has taken the age from them."""
+    """Make the tangent vectors of a run orthonormal again where its mode takes the age from them."""
     if trajectory.system.age is not None:
+        trajectory.replace_tangents(trajectory.tangent_matrix)
         trajectory.replace_tangents(np.linalg.qr(trajectory.tangent_matrix)[0])
 
 

@@ -115,7 +115,7 @@ class Shooting:
 
     def _trajectory(self, point: Point, mode: str | None) -> Trajectory:
         """A run from a point that carries the columns of the identity."""
-        return start(
+        trajectory = start(
             self.system,
             self.whole(point),
             point.t,
@@ -124,6 +124,8 @@ class Shooting:
             solver=self.solver,
             tangent=np.eye(self.system.tangent_dimension),
         )
+        trajectory.replace_tangents(trajectory.tangent_matrix)
+        return trajectory
 
     def newton(self, point: Point, free_period: bool, tolerance: float, max_iterations: int) -> PeriodicOrbit:
         """Newton's method from ``point``; the period may be unknown too.

@@ -121,10 +121,7 @@ class Common:
             choose_mode(compiled.system, plan.parts_so_far, model, memory.run, memory.work, mode)
         memory.run.mode = index
         most = self.solver.max_steps
-        made = Trajectory(compiled, plan, model, memory, tangents, most, phase0, beyond, self.stop)
-        if tangents and compiled.system.age is not None:
-            made.replace_tangents(made.tangent_matrix)
-        return made
+        return Trajectory(compiled, plan, model, memory, tangents, most, phase0, beyond, self.stop)
 
 
 @attrs.frozen(eq=False)

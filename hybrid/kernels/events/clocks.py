@@ -82,10 +82,10 @@ def first_from(model, run, transition, beyond):
 
 
 @njit(**IN_ORDER)
-def keep_entry(model, run, starts):
-    """Keep the time at which the mode has been entered; where a run ``starts``, its state tells that."""
+def keep_entry(model, run):
+    """Keep the time at which the mode has been entered: now, or as long ago as the state says."""
     run.entry_cycle, run.entry_phase, run.entry_low = run.cycle, run.phase, run.phase_low
-    if starts and model.age >= 0:
+    if model.age >= 0:
         run.entry_phase, lost = sum_in_two_parts(run.phase, -run.y[model.age])
         run.entry_low += lost
 
@@ -101,7 +101,7 @@ def wind(model, run):
     entered = starts or model.enters[run.last_fired] == 1
     moved = not starts and model.whole_mode[run.previous_mode] != model.whole_mode[mode]
     if entered:
-        keep_entry(model, run, starts)
+        keep_entry(model, run)
     for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
         transition = model.clocks[slot]
         own = model.tick_of[transition]
@@ -155,16 +155,27 @@ def go_to_tick(model, run, transition):
 
 
 @njit(**KERNEL)
+def ticks_now(model, run, transition):
+    """Whether the next tick of a clock is at this instant."""
+    k = number_of_tick(model, run, transition)
+    return time_to_tick(model, run, transition, k) <= rounding_of_tick(model, run, transition, k)
+
+
+@njit(**KERNEL)
 def ticking(model, run, work):
-    """The first listed of the clocks that tick now and may fire; ticks that may not are passed over."""
-    mode = run.mode
-    for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
+    """The first listed of the clocks that tick now and may fire; ticks that may not are passed over.
+
+    Copies of one transition have one tick, which is not passed over if one of them may fire.
+    """
+    first, last, fires = model.first_clock[run.mode], model.first_clock[run.mode + 1], NO_TRANSITION
+    for slot in range(first, last):
         transition = model.clocks[slot]
-        k = number_of_tick(model, run, transition)
-        left = time_to_tick(model, run, transition, k)
-        if left > rounding_of_tick(model, run, transition, k):
-            continue
-        if allowed(model, transition, run.phase, run.y, work.scalar):
-            return transition
-        pass_tick(model, run, transition, False)
-    return NO_TRANSITION
+        if ticks_now(model, run, transition) and allowed(model, transition, run.phase, run.y, work.scalar):
+            last, fires = slot, transition
+            break
+    for slot in range(first, last):
+        transition = model.clocks[slot]
+        copy = fires != NO_TRANSITION and model.tick_of[transition] == model.tick_of[fires]
+        if not copy and ticks_now(model, run, transition):
+            pass_tick(model, run, transition, False)
+    return fires
