@@ -74,8 +74,8 @@ from hybrid.testing.saltation import (
     check_sum_rule,
 )
 from hybrid.testing.strategies import Ranges, all_laws, cases
-from hybrid.transform.aged import aged
 from hybrid.testing.units import UNITS, check_units
+from hybrid.transform.aged import aged
 
 # Properties of the functions, at the start of a case, and of the whole run; laws are others.
 WITHOUT_RUN = (DERIVATIVES, COMPILED, PERIOD, ANGLES, SIDES_AFTER, LIMITS, ENDS)

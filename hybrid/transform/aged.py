@@ -1,8 +1,8 @@
 """The time since the entry of the mode as a component of the state, for what `After` does to derivatives.
 
-A run itself needs no such component: its clock knows when the mode was entered. A perturbation of the run does:
-it may enter the mode earlier or later, and leaves it so much earlier or later, also where nothing else of it is
-left, as in a rest at a fixed state.
+A run itself needs no such component: its clock knows when the mode was entered. A perturbation of the run
+needs it. The perturbed run enters the mode earlier or later, and leaves it as much earlier or later, also where
+nothing else of the perturbation is left: in a rest at a fixed state.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ _ORIGINALS: WeakKeyDictionary[HybridSystem, HybridSystem] = WeakKeyDictionary()
 def aged(system: HybridSystem) -> HybridSystem:
     """The system with the age, last of what has tangent vectors; itself if no clock counts from an entry.
 
-    The age moves at the rate 1 in modes whose clocks count from the entry. It is zero in all others, and after
-    each jump that enters a mode. The component is an ordinary one, so that saltation matrices, orbits and
-    sensitivities need no rule for it. Held components become ones with the rate 0 before it.
+    The age moves at the rate 1 in modes whose clocks count from the entry. It is zero in all others, and
+    after each jump that enters a mode. The component is an ordinary one, so that saltation matrices, orbits
+    and sensitivities need no rule for it. Held components become ones with the rate 0 before it.
     """
     if system.age is not None or not system.aging:
         return system
@@ -85,7 +85,7 @@ class _Aging:
             held=(),
             modes=[self._mode(mode) for mode in original.modes],
             transitions=[self._transition(each) for each in original.transitions],
-            growth=None if original.growth is None else _Growth(original.growth),
+            growth=original.growth and _Growth(original.growth, original.growth.original),
         )
 
     def _name(self) -> str:
@@ -136,17 +136,14 @@ class _Aging:
         return named_values(STATE, original.state_names, (*x[: self.age], *x[self.age + 1 :]))
 
 
-@attrs.frozen(eq=False)
+@attrs.define(eq=False)
 class _Growth:
     """The growth of a system as that of the aged one."""
 
     inner: Growth
+    original: Any
+    # What has been made of the aged functions is not what has been made of their originals.
     written: dict[Any, Any] = attrs.field(factory=dict)
-
-    @property
-    def original(self) -> Any:
-        """The user's system."""
-        return self.inner.original
 
     @property
     def current(self) -> Any:

@@ -54,8 +54,8 @@ FALL_OF_EXACT = 4.0
 class Columns(NamedTuple):
     """The columns of a series by which its step is controlled.
 
-    The first ``n`` are the state, of which ``controlled`` have tangent vectors. The tangent vectors, four in a group, begin at ``first``, and their
-    ``groups`` are ``stride`` columns apart.
+    The first ``n`` are the state, of which ``controlled`` have tolerances. The tangent vectors, four in a
+    group, begin at ``first``, and their ``groups`` are ``stride`` columns apart.
     """
 
     n: INTEGER

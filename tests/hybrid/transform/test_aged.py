@@ -22,7 +22,7 @@ PERIOD, DRIVE, REST = 1.45, 1.5, 0.3
 
 
 def neuron(**changes):
-    """A leaky integrate-and-fire neuron, clamped for a refractory time after each spike; forced with ``P``."""
+    """A leaky integrate-and-fire neuron, clamped for a refractory time after each spike; it may be forced."""
     given = {"I": DRIVE, "A": 0.0, "theta": 1.0, "r": REST, "P": PERIOD}
     return HybridSystem(
         state=("v",),
@@ -148,9 +148,12 @@ def test_derivatives_are_those_of_the_flow(system, x0, mode, names):
     n, start = len(x0), np.append(x0, np.zeros(system.dimension - len(x0)))
     asked = {"tangent": True, "sensitivities": names, "samples": [1.0, end]}
     arc = simulate(system, start, (0.0, end), mode=mode, **asked)
-    assert arc.status.ok and arc.jump_count > 3
-    assert arc.x.shape == (2, system.dimension) and arc.system.state_names == system.state_names
-    assert arc.fundamental.shape == (n, n) and arc.sampled_fundamental.shape == (2, n, n)
+    assert arc.status.ok
+    assert arc.jump_count > 3
+    assert arc.x.shape == (2, system.dimension)
+    assert arc.system.state_names == system.state_names
+    assert arc.fundamental.shape == (n, n)
+    assert arc.sampled_fundamental.shape == (2, n, n)
     for i in range(n):
         moved = difference(lambda h, i=i: run(system, x0 + h * np.eye(n)[i], end, mode)[:n], 0.0)
         np.testing.assert_allclose(arc.fundamental[:, i], moved, atol=2e-7)
@@ -192,13 +195,16 @@ def test_times_of_spikes_move_with_what_went_before():
 
 def test_a_free_neuron_has_the_multiplier_of_the_flow_alone():
     orbit = periodic_orbit(neuron(), (0.2,), period=1.3)
-    assert orbit.status.ok and orbit.mode == "rise" and orbit.x0.shape == (1,)
+    assert orbit.status.ok
+    assert orbit.mode == "rise"
+    assert orbit.x0.shape == (1,)
     assert orbit.period == pytest.approx(math.log(DRIVE / (DRIVE - 1.0)) + REST, rel=1e-12)
     np.testing.assert_allclose(orbit.multipliers, [1.0], rtol=1e-12)
     found = orbit.sensitivity(("r", "theta", "I"))
     exact = [1.0, 1.0 / (DRIVE - 1.0), 1.0 / DRIVE - 1.0 / (DRIVE - 1.0)]
     np.testing.assert_allclose(found.period, exact, atol=1e-11)
-    assert found.x0.shape == (1, 3) and found.multipliers.shape == (1, 3)
+    assert found.x0.shape == (1, 3)
+    assert found.multipliers.shape == (1, 3)
     end = simulate(orbit.system, orbit.x0, (orbit.t0, orbit.t0 + orbit.period), mode=orbit.mode).x[-1]
     np.testing.assert_allclose(end, orbit.x0, atol=1e-11)
 
@@ -210,7 +216,9 @@ def test_a_branch_has_the_closed_period(name, span):
     values = {each: np.full(len(branch), system.parameters[each]) for each in ("r", "theta", "I")}
     values[name] = branch.parameter
     exact = values["r"] - np.log(1.0 - values["theta"] / values["I"])
-    assert branch.status.ok and branch.bifurcations == () and branch.x0.shape[1] == 1
+    assert branch.status.ok
+    assert branch.bifurcations == ()
+    assert branch.x0.shape[1] == 1
     np.testing.assert_allclose(branch.period, exact, rtol=1e-11)
     np.testing.assert_allclose(branch.orbit(3).multipliers, [1.0], rtol=1e-10)
 
@@ -238,12 +246,14 @@ def test_a_forced_orbit_has_the_multiplier_of_the_map_of_spikes():
     guess = simulate(system, (0.0,), (spike, rising), mode="rest").x[-1]
     orbit = periodic_orbit(system, guess, mode="rise", t0=rising)
     exact = closed_multiplier(orbit.arc().jumps["fire"][0].t)
-    assert orbit.status.ok and orbit.system.state_names == ("v",)
+    assert orbit.status.ok
+    assert orbit.system.state_names == ("v",)
     np.testing.assert_allclose(orbit.multipliers, [exact], rtol=1e-12)
     np.testing.assert_allclose(floquet_exponents(orbit), [math.log(exact) / PERIOD], rtol=1e-12)
 
     resting = periodic_orbit(system, (0.0,), mode="rest", t0=spike + 0.1)
-    assert resting.status.ok and resting.system.state_names == ("v", "age")
+    assert resting.status.ok
+    assert resting.system.state_names == ("v", "age")
     np.testing.assert_allclose(resting.x0, [0.0, 0.1], atol=1e-9)
     np.testing.assert_allclose(resting.multipliers, [exact, 0.0], rtol=1e-12)
     again = simulate(resting.system, resting.x0, (resting.t0, resting.t0 + PERIOD), mode="rest")
@@ -254,7 +264,9 @@ def test_a_branch_of_orbits_that_rest_has_their_age():
     system, spike, _ = locked()
     resting = periodic_orbit(system, (0.0,), mode="rest", t0=spike + 0.1)
     branch = hybrid.continue_orbit(resting, "A", (0.18, 0.25))
-    assert branch.status.ok and branch.system.state_names == ("v", "age") and branch.x0.shape[1] == 2
+    assert branch.status.ok
+    assert branch.system.state_names == ("v", "age")
+    assert branch.x0.shape[1] == 2
     i = len(branch) // 2
     orbit = branch.orbit(i)
     fire = orbit.arc().jumps["fire"][0].t
@@ -268,7 +280,8 @@ def test_a_ball_that_rests_has_the_multiplier_of_its_launches():
     g, e, c, r = 9.81, 0.8, 1.0, 0.2
     orbit = periodic_orbit(bouncer(), (1.2, 0.0), period=1.2)
     v = c / (1.0 - e)
-    assert orbit.status.ok and orbit.period == pytest.approx(2.0 * v / g + r, rel=1e-12)
+    assert orbit.status.ok
+    assert orbit.period == pytest.approx(2.0 * v / g + r, rel=1e-12)
     np.testing.assert_allclose(orbit.multipliers, [1.0, e, 0.0], rtol=1e-11, atol=1e-13)
     np.testing.assert_allclose(orbit.x0[2], -v, rtol=1e-11)
 
@@ -277,7 +290,8 @@ def test_modes_that_take_turns_have_the_age_as_one_more_direction():
     """Nothing but the ages tells when the modes change: the multiplier 1 of the flow is beside the others."""
     system = alternating()
     orbit = periodic_orbit(system, (0.2, 0.0), period=0.8)
-    assert orbit.status.ok and orbit.system.state_names == ("q", "u", "age")
+    assert orbit.status.ok
+    assert orbit.system.state_names == ("q", "u", "age")
     np.testing.assert_allclose(orbit.multipliers, [1.0, 0.5, math.exp(-1.3)], rtol=1e-11)
     spectrum = lyapunov_spectrum(system, (0.2, 0.0), interval=0.8, intervals=300)
     np.testing.assert_allclose(0.8 * spectrum.exponents, [0.0, math.log(0.5), -1.3], atol=1e-12)
@@ -286,13 +300,15 @@ def test_modes_that_take_turns_have_the_age_as_one_more_direction():
 
 @pytest.mark.parametrize(("mode", "v"), [("rise", 0.5), ("rest", 0.0)])
 def test_exponents_are_those_of_the_orbit(mode, v):
-    system, spike, rising = locked()
+    system, spike, _rising = locked()
     exact = math.log(closed_multiplier(spike)) / PERIOD
     spectrum = lyapunov_spectrum(system, (v,), mode=mode, intervals=300, transient=60)
     np.testing.assert_allclose(spectrum.exponents, [exact], atol=1e-8)
-    assert spectrum.x.shape == (1,) and math.isnan(spectrum.sum_rule)
+    assert spectrum.x.shape == (1,)
+    assert math.isnan(spectrum.sum_rule)
     pair = two_orbit_exponents(system, (v,), mode=mode, intervals=200, transient=60, separation=1e-7)
-    assert pair.status.ok and pair.renormalised_exponent == pytest.approx(exact, abs=1e-6)
+    assert pair.status.ok
+    assert pair.renormalised_exponent == pytest.approx(exact, abs=1e-6)
 
 
 def test_other_exponents():
@@ -302,10 +318,12 @@ def test_other_exponents():
     np.testing.assert_allclose(vectors.exponents, [exact, -np.inf], atol=1e-8)
     assert vectors.names.state == ("v", "age")
     growth = finite_time_exponents(system, [(0.5,), (0.2,)], interval=PERIOD)
-    assert growth.shape == (2, 1) and np.all(np.isfinite(growth))
+    assert growth.shape == (2, 1)
+    assert np.all(np.isfinite(growth))
     found = chart(system, {"A": [0.2]}, (0.5,), intervals=300, transient=60, section=2)
     np.testing.assert_allclose(found.exponents, [[exact]], atol=1e-8)
-    assert found.section.shape == (1, 2, 1) and np.all(np.isfinite(found.section))
+    assert found.section.shape == (1, 2, 1)
+    assert np.all(np.isfinite(found.section))
 
 
 def test_an_orbit_that_never_rests_pays_nothing():
@@ -326,10 +344,12 @@ def test_an_orbit_that_never_rests_pays_nothing():
     )
     orbit = periodic_orbit(system, (0.0, 2.0))
     moduli = np.full(2, math.exp(-0.5 * math.pi))
-    assert orbit.status.ok and "family" not in orbit.status.message
+    assert orbit.status.ok
+    assert "family" not in orbit.status.message
     np.testing.assert_allclose(np.abs(orbit.multipliers), moduli, rtol=1e-11)
     branch = hybrid.continue_orbit(orbit, "k", (0.9, 1.1))
-    assert branch.stable.all() and branch.x0.shape == branch.multipliers.shape == (len(branch), 2)
+    assert branch.stable.all()
+    assert branch.x0.shape == branch.multipliers.shape == (len(branch), 2)
 
 
 def test_a_system_whose_clocks_count_from_time_zero_pays_nothing():
@@ -344,8 +364,10 @@ def test_a_system_whose_clocks_count_from_time_zero_pays_nothing():
 def test_the_age_is_a_component_as_any_other():
     system = bouncer()
     whole = aged(system)
-    assert whole is aged(system) and aged(whole) is whole
-    assert whole.state_names == ("q", "v", "u", "age", "n") and whole.age == 3
+    assert whole is aged(system)
+    assert aged(whole) is whole
+    assert whole.state_names == ("q", "v", "u", "age", "n")
+    assert whole.age == 3
     assert [has_age(system, mode) for mode in system.mode_names] == [False, True]
     arc = simulate(whole, (1.0, 0.3, -1.0, 0.0, 0.0), (0.0, 4.0))
     go, hit = arc.jumps["go"], arc.jumps["hit"]
