@@ -126,6 +126,7 @@ def _orbit(
         tangent=True,
     )
     assert arc.fundamental is not None
+    change = (arc.x[-1] - x0)[: system.tangent_dimension]
     with np.errstate(divide="ignore"):
         moduli = np.log(np.abs(multipliers))
     return PeriodicOrbit(
@@ -138,10 +139,10 @@ def _orbit(
         multipliers=multipliers.real if np.all(multipliers.imag == 0.0) else multipliers,
         log_moduli=moduli,
         fundamental=arc.fundamental,
-        residual=float(np.linalg.norm(closed_change(arc.x[-1] - x0, system.turn_lengths))),
+        residual=float(np.linalg.norm(closed_change(change, system.turn_lengths[: len(change)]))),
         iterations=0,
         signature=(mode, *(str(jump.target) for jump in arc.jumps)),
         transitions=tuple(map(str, arc.jumps.transition)),
         status=SUCCESS,
-        turns=turns_over(system, arc.x[-1] - x0),
+        turns=turns_over(system, change),
     )
