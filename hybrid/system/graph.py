@@ -484,15 +484,6 @@ def watched_by(system: HybridSystem) -> Watched:
     return Watched([*(each.function for each in functions), *(each.derivative for each in functions), period])
 
 
-def refuse_counters(system: HybridSystem, what: str) -> None:
-    """ArgumentError if a system has counters, from a calculation, ``what``, that compares whole states."""
-    if system.counters:
-        raise ArgumentError(
-            f"{what} compares whole states, and a counter never comes back. Leave "
-            f"{', '.join(system.counters)} out of the system."
-        )
-
-
 def as_system(name: str, value: object) -> HybridSystem:
     """A system, or an ArgumentError that begins with the name of the argument."""
     return arguments.instance(name, value, HybridSystem, "Call the model's factory first.")
