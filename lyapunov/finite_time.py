@@ -48,7 +48,8 @@ def finite_time_exponents(
     system, mode, parameters, t0, solver
         As for :func:`hybrid.simulate`.
     x0
-        A start ``(n,)``, or starts ``(N, n)``.
+        A start ``(n,)``, or starts ``(N, n)``. Held components and counters come last and may be left out:
+        they are 0 then.
     interval
         The time :math:`T`; by default as for :func:`lyapunov.lyapunov_spectrum`.
     intervals
@@ -78,7 +79,7 @@ def finite_time_exponents(
     array([ 0.5, -0.5])
     """
     as_system("system", system)
-    starts = arguments.numbers("x0", x0, STARTS)
+    starts = system.variables.completed(arguments.numbers("x0", x0, STARTS))
     count = 1 if intervals is None else arguments.count("intervals", intervals, 1)
     one = starts.ndim == 1
     if not one:
@@ -112,6 +113,7 @@ def _check(system: HybridSystem, starts: np.ndarray) -> None:
     bad = np.flatnonzero(~np.isfinite(starts).all(axis=1))
     if bad.size:
         raise ArgumentError(f"x0 must be finite; got x0[{bad[0]}] = {starts[bad[0]].tolist()}.")
+    system.variables.check_counts("x0", starts)
 
 
 def _fill(out: np.ndarray, trajectory: Trajectory, length: float) -> None:

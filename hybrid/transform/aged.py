@@ -1,8 +1,8 @@
 """The time since the entry of the mode as a component of the state, for what `After` does to derivatives.
 
 A run itself needs no such component: its clock knows when the mode was entered. A perturbation of the run
-needs it. The perturbed run enters the mode earlier or later, and leaves it as much earlier or later. That holds
-also where nothing else of the perturbation is left: in a rest at a fixed state.
+needs it. The perturbed run enters the mode earlier or later, and leaves it as much earlier or later. That
+holds also where nothing else of the perturbation is left: in a rest at a fixed state.
 """
 
 from __future__ import annotations

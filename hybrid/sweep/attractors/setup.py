@@ -112,8 +112,8 @@ def setup_of(system: HybridSystem, first: np.ndarray, given: Mapping[str, Any]) 
     """The setup of a search with every argument checked.
 
     The system is the aged one: where a mode is left at a time after its entry, that time is a part of the
-    state. ``first`` is a start that shows the time scale; ``given`` has the arguments of :func:`hybrid.attractors`
-    that are fields of a setup.
+    state. ``first`` is a start that shows the time scale; ``given`` has the arguments of
+    :func:`hybrid.attractors` that are fields of a setup.
     """
     as_system("system", system)
     system = aged(system)
