@@ -43,7 +43,8 @@ class PeriodicOrbit:
     Attributes
     ----------
     system, parameters
-        The model, and the values of all its parameters, by name.
+        The model, and the values of all its parameters, by name. If the point lies in a mode that an
+        `hybrid.After` leaves, it is the model with the time since the entry as one more component, ``age``.
     x0, mode, t0
         A point of the orbit ``(n,)``, its mode, and the time there.
     period

@@ -274,7 +274,9 @@ class After(Clock):
     """A clock that ticks once, so long after its mode was entered, in the place of a guard.
 
     The start of a run is an entry. A transition from the mode to itself enters it anew, unless it has no
-    reset and so changes nothing.
+    reset and so changes nothing. For derivatives, the time since the entry is one more component of the
+    state, the age; orbits and branches whose points lie in such a mode show it as their last component but
+    for counters.
 
     Parameters
     ----------
