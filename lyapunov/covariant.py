@@ -18,6 +18,7 @@ from hybrid.simulation.ending import status_of
 from hybrid.simulation.labelled import Names, attributes, with_counters
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
+from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
 from hybrid.transform.aged import aged
 from lyapunov.spectrum import generic_directions, interval_length
@@ -181,7 +182,7 @@ def covariant_vectors(
     >>> bool(abs(found.exponents[0] - 0.5) < 1e-6)
     True
     """
-    n = aged(system).tangent_dimension
+    n = aged(as_system("system", system)).tangent_dimension
     basis = generic_directions(n, n)
     intervals = arguments.count("intervals", intervals, 1)
     transient = arguments.count("transient", transient, 0)
