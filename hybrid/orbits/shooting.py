@@ -124,6 +124,7 @@ class Shooting:
             solver=self.solver,
             tangent=np.eye(self.system.tangent_dimension),
         )
+        # Where the age counts for nothing, its column is zero.
         trajectory.replace_tangents(trajectory.tangent_matrix)
         return trajectory
 
@@ -260,7 +261,8 @@ class Shooting:
     def _is_ageless(self, modes: np.ndarray) -> np.ndarray:
         """In which of these modes the state has no age, ``(N,)``; all count if it has one everywhere."""
         system = self.system
-        found = np.array([system.age is None or not has_age(system, str(mode)) for mode in modes])
+        ageless = [mode for mode in system.mode_names if system.age is None or not has_age(system, mode)]
+        found = np.isin(modes, ageless)
         return found | ~found.any()
 
     def _moved(self, guess: Point, shift: float) -> tuple[Shooting, Point]:

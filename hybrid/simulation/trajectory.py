@@ -75,7 +75,12 @@ def directed(
 
 def explore(system: HybridSystem, t0: float, state: np.ndarray, values: np.ndarray, mode: str | None) -> None:
     """Unexplored if modes of a growing system in which a run may start have been made only now."""
-    if system.growth is not None and system.growth.place(t0, state, values, mode):
+    growth = system.growth
+    if growth is None:
+        return
+    # A run on a later stage of the system may have told the mode.
+    later = mode not in system.mode_names and mode in growth.current.mode_names
+    if later or growth.place(t0, state, values, mode):
         raise Unexplored(mode)
 
 

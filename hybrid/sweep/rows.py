@@ -27,7 +27,7 @@ from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, as_system, check_mode, starting_mode
 from hybrid.system.growth import Unexplored
 from hybrid.system.labels import by_label, named, plain_name
-from hybrid.transform.aged import without_age
+from hybrid.transform.aged import aged, without_age
 from hybrid.transform.markers import with_section
 
 # Where the points of a section are taken: per forcing period, at crossings of a surface, or at each jump.
@@ -87,7 +87,8 @@ class Rows:
     def prepare(self, tangents: int) -> None:
         """Compile and load all that the rows need, so that threads do not do so at the same time."""
         load_kernels("hybrid.kernels.events.sections")
-        for system, count in {(self.system, tangents), (self.system, 0), (self.marked, 0)}:
+        with_tangents = aged(self.system) if tangents else self.system
+        for system, count in {(with_tangents, tangents), (self.system, 0), (self.marked, 0)}:
             plan_of(compile_system(system), self.solver, count)
 
     def begin(

@@ -195,6 +195,9 @@ class HybridSystem(Portable):
     )
     # Cache of compile_system, with the lifetime of the system.
     _compiled: Any = attrs.field(default=None, init=False, repr=False)
+    # The system with the time since the entry of a mode as a component; and of that system the original.
+    _aged: Any = attrs.field(default=None, init=False, repr=False)
+    _original: Any = attrs.field(default=None, init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
         object.__setattr__(self, "units", self.variables.as_units(self.units))
@@ -482,6 +485,11 @@ def watched_by(system: HybridSystem) -> Watched:
     functions = [function for _, function in functions_of(system)]
     period = system.period if callable(system.period) else None
     return Watched([*(each.function for each in functions), *(each.derivative for each in functions), period])
+
+
+def watched_below(system: HybridSystem) -> Watched:
+    """The values that decide a system that is made from this one: what this one and those below it read."""
+    return watched_by(system).joined(system.derived_from)
 
 
 def as_system(name: str, value: object) -> HybridSystem:

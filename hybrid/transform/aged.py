@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import count
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import attrs
 import numpy as np
@@ -18,14 +17,11 @@ import numpy as np
 from hybrid.system.clocks import Clock, DerivedClock, numbers_of
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
-from hybrid.system.graph import HybridSystem, enters_anew
+from hybrid.system.graph import HybridSystem, enters_anew, watched_below
 from hybrid.system.growth import Growth
 from hybrid.system.variables import STATE, named_values
 
 AGE = "age"
-
-_AGED: WeakKeyDictionary[HybridSystem, HybridSystem] = WeakKeyDictionary()
-_ORIGINALS: WeakKeyDictionary[HybridSystem, HybridSystem] = WeakKeyDictionary()
 
 
 def aged(system: HybridSystem) -> HybridSystem:
@@ -37,15 +33,17 @@ def aged(system: HybridSystem) -> HybridSystem:
     """
     if system.age is not None or not system.aging:
         return system
-    if system not in _AGED:
-        _AGED[system] = _Aging(system).system()
-        _ORIGINALS[_AGED[system]] = system
-    return _AGED[system]
+    if system._aged is None or not system._aged.derived_from.holds():
+        made = _Aging(system).system()
+        object.__setattr__(made, "_original", system)
+        object.__setattr__(system, "_aged", made)
+    found: HybridSystem = system._aged
+    return found
 
 
 def original_of(system: HybridSystem) -> HybridSystem:
     """The system whose aged one this is; itself if there is none."""
-    return _ORIGINALS.get(system, system)
+    return system if system._original is None else system._original
 
 
 def with_age(system: HybridSystem, x: np.ndarray) -> np.ndarray:
@@ -85,6 +83,7 @@ class _Aging:
             held=(),
             modes=[self._mode(mode) for mode in original.modes],
             transitions=[self._transition(each) for each in original.transitions],
+            derived_from=watched_below(original),
             growth=original.growth and _Growth(original.growth, original.growth.original),
         )
 

@@ -14,7 +14,7 @@ from hybrid.expression.values import TraceError
 from hybrid.system.clocks import Clock, DerivedClock, numbers_of
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeField, WholeReset
-from hybrid.system.graph import HybridSystem
+from hybrid.system.graph import HybridSystem, watched_below
 from hybrid.system.laws import Laws
 from hybrid.system.variables import PARAMETERS, STATE, named_values
 
@@ -30,7 +30,7 @@ def extended(system: HybridSystem, names: tuple[str, ...]) -> HybridSystem:
     the period depends on one of the parameters the system has none: time is a plain number.
     """
     made = _EXTENDED.setdefault(system, {})
-    if names not in made:
+    if names not in made or not made[names].derived_from.holds():
         made[names] = _Extension(system, names).system()
     return made[names]
 
@@ -65,6 +65,7 @@ class _Extension:
             laws=Laws(),
             notes=(),
             growth=None,
+            derived_from=watched_below(original),
         )
 
     def _mode(self, mode: Mode) -> Mode:

@@ -20,6 +20,7 @@ from hybrid.solvers import Taylor
 from hybrid.status import SUCCESS, Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.periodicity import closed_change
+from hybrid.transform.aged import aged
 
 if TYPE_CHECKING:
     import xarray
@@ -64,6 +65,9 @@ def open_branch(system: HybridSystem, saved: xarray.Dataset | str | Path) -> Bra
             saved = xarray.open_zarr(saved).load()
     if not isinstance(saved, xarray.Dataset) or saved.attrs.get("kind") != KIND:
         raise arguments.refusal("saved", "be the dataset of a branch, or a folder where it is", saved)
+    if len(saved.state) > system.dimension:
+        # Points of the branch lie in modes where the time since the entry counts.
+        system = aged(system)
     if tuple(map(str, saved.state.values)) != system.state_names:
         raise ArgumentError(
             f"saved is a branch of a system with the states {', '.join(map(str, saved.state.values))}; got a "
