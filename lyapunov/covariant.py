@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 class CovariantVectors:
     """Covariant Lyapunov vectors at the starts of ``N`` intervals of one orbit.
 
+    If a mode has an `hybrid.After`, states and vectors have the time since the entry as their last component
+    but for counters.
+
     Attributes
     ----------
     vectors

@@ -20,9 +20,10 @@ from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
+from hybrid.system.entries import has_age
 from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
-from hybrid.transform.aged import aged, has_age, with_age
+from hybrid.transform.aged import aged, with_age
 from lyapunov.interval import end_at
 from lyapunov.spectrum import INTERVALS_AT_ONCE, interval_length
 

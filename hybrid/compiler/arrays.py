@@ -10,7 +10,8 @@ import numpy as np
 
 from hybrid.kernels.types.codes import AT
 from hybrid.system.elements import Transition
-from hybrid.system.graph import HybridSystem, enters_anew
+from hybrid.system.entries import enters_anew
+from hybrid.system.graph import HybridSystem
 
 if TYPE_CHECKING:
     from hybrid.compiler.emitted import Emitted

@@ -20,9 +20,10 @@ from hybrid.simulation.plan import check_solver
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver, Taylor
 from hybrid.status import Status
+from hybrid.system.entries import has_age
 from hybrid.system.graph import HybridSystem
 from hybrid.system.periodicity import whole_turns
-from hybrid.transform.aged import has_age, original_of
+from hybrid.transform.aged import original_of
 
 if TYPE_CHECKING:
     import xarray

@@ -23,9 +23,9 @@ from hybrid.simulation.simulate import simulate
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode, noting
+from hybrid.system.entries import has_age
 from hybrid.system.graph import HybridSystem, functions_of
 from hybrid.system.periodicity import angle_fault_at, closed_change
-from hybrid.transform.aged import has_age
 
 # Points, besides the solver's own, that show how far an orbit moves.
 SAMPLES = 65

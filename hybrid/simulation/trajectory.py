@@ -19,9 +19,10 @@ from hybrid.simulation.memory import Memory, put_tangents
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import Plan, check_solver, plan_of
 from hybrid.solvers import Solver
+from hybrid.system.entries import has_age
 from hybrid.system.graph import HybridSystem, as_system, starting_mode
 from hybrid.system.growth import Unexplored
-from hybrid.transform.aged import aged, has_age, with_age
+from hybrid.transform.aged import aged, with_age
 
 
 def start(

@@ -195,9 +195,10 @@ class HybridSystem(Portable):
     )
     # Cache of compile_system, with the lifetime of the system.
     _compiled: Any = attrs.field(default=None, init=False, repr=False)
-    # The system with the time since the entry of a mode as a component; and of that system the original.
+    # The system with the time since the entry of a mode as a component, with the same lifetime.
     _aged: Any = attrs.field(default=None, init=False, repr=False)
-    _original: Any = attrs.field(default=None, init=False, repr=False)
+    # The function that has made this system from another one, and that one.
+    _made_by: Any = attrs.field(default=None, init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
         object.__setattr__(self, "units", self.variables.as_units(self.units))
@@ -206,6 +207,12 @@ class HybridSystem(Portable):
         unchecked = self._unchecked()
         check_functions(self.variables, unchecked, self.period)
         check_angles(self.variables, unchecked, self.turn_lengths)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self._made_by is None:
+            return Portable.__reduce__(self)
+        function, original = self._made_by
+        return function, (original,)
 
     @property
     def is_whole(self) -> bool:
@@ -428,15 +435,6 @@ def ticks_of(system: HybridSystem, x: np.ndarray, parameters: np.ndarray) -> lis
                 raise ArgumentError(f"{owner}: {fault} with these parameters.")
             found += numbers
     return found
-
-
-def enters_anew(system: HybridSystem, transition: Transition) -> bool:
-    """Whether a transition enters its target anew: not if it marks, or leads to another part of its mode."""
-    if transition.target is None or transition.is_marker:
-        return False
-    source, target = map(system.mode_index, (transition.source, transition.target))
-    whole, other = system.modes[source].part_of, system.modes[target].part_of
-    return transition.part_of is not None or whole is None or whole != other
 
 
 def check_mode(system: HybridSystem, name: object, what: str = "Mode") -> None:

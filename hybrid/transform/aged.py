@@ -16,8 +16,9 @@ import numpy as np
 
 from hybrid.system.clocks import Clock, DerivedClock, numbers_of
 from hybrid.system.elements import Guard, Mode, Reset, Transition
+from hybrid.system.entries import enters_anew, has_age
 from hybrid.system.functions import WholeReset
-from hybrid.system.graph import HybridSystem, enters_anew, watched_below
+from hybrid.system.graph import HybridSystem, watched_below
 from hybrid.system.growth import Growth
 from hybrid.system.variables import STATE, named_values
 
@@ -35,7 +36,7 @@ def aged(system: HybridSystem) -> HybridSystem:
         return system
     if system._aged is None or not system._aged.derived_from.holds():
         made = _Aging(system).system()
-        object.__setattr__(made, "_original", system)
+        object.__setattr__(made, "_made_by", (aged, system))
         object.__setattr__(system, "_aged", made)
     found: HybridSystem = system._aged
     return found
@@ -43,7 +44,10 @@ def aged(system: HybridSystem) -> HybridSystem:
 
 def original_of(system: HybridSystem) -> HybridSystem:
     """The system whose aged one this is; itself if there is none."""
-    return system if system._original is None else system._original
+    if system._made_by is None:
+        return system
+    found: HybridSystem = system._made_by[1]
+    return found
 
 
 def with_age(system: HybridSystem, x: np.ndarray) -> np.ndarray:
@@ -54,12 +58,6 @@ def with_age(system: HybridSystem, x: np.ndarray) -> np.ndarray:
 def without_age(system: HybridSystem, x: np.ndarray) -> np.ndarray:
     """States of the system ``(..., n)`` from its own or those of the aged one."""
     return np.delete(x, system.tangent_dimension, axis=-1) if x.shape[-1] > system.dimension else x
-
-
-def has_age(system: HybridSystem, mode: str) -> bool:
-    """Whether the age counts in a mode: elsewhere it is zero, and no perturbation moves it."""
-    index = system.mode_index(mode)
-    return (system.modes[index].part_of or mode) in system.aging
 
 
 def least_dimension(system: HybridSystem) -> int:

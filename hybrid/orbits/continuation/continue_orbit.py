@@ -19,7 +19,8 @@ from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import Solver, Taylor
 from hybrid.status import SUCCESS, Status, StatusCode
-from hybrid.transform.aged import has_age, original_of
+from hybrid.system.entries import has_age
+from hybrid.transform.aged import original_of
 
 Item = Place | Event
 

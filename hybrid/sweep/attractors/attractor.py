@@ -12,8 +12,9 @@ import numpy as np
 from hybrid.display.tables import counted, html_table
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.status import Status
+from hybrid.system.entries import has_age
 from hybrid.system.graph import HybridSystem
-from hybrid.transform.aged import has_age, original_of
+from hybrid.transform.aged import original_of
 
 if TYPE_CHECKING:
     import xarray

@@ -1,6 +1,7 @@
 """Derivatives where a clock counts from the entry of its mode, against closed forms and differences."""
 
 import math
+import pickle
 
 import attrs
 import numpy as np
@@ -8,8 +9,9 @@ import pytest
 
 import hybrid
 from hybrid import After, Every, Guard, HybridSystem, Mode, Reset, Transition, periodic_orbit, simulate, split
+from hybrid.system.entries import has_age
 from hybrid.testing import check_system
-from hybrid.transform.aged import aged, has_age
+from hybrid.transform.aged import aged, original_of
 from lyapunov import (
     chart,
     covariant_vectors,
@@ -377,6 +379,31 @@ def test_the_age_is_a_component_as_any_other():
     # A run that starts in the middle of a rest leaves it as much earlier.
     arc = simulate(whole, (0.0, 0.0, -1.0, 0.15, 0.0), (5.0, 6.0), mode="rest")
     assert arc.jumps[0].t == pytest.approx(5.05, rel=1e-15)
+
+
+def test_an_aged_system_is_pickled_as_its_original():
+    again = pickle.loads(pickle.dumps(aged(PORTABLE)))
+    assert again.state_names == ("q", "age")
+    assert original_of(again).state_names == ("q",)
+    arc = simulate(again, (0.3, 0.0), (0.0, 2.0))
+    np.testing.assert_array_equal(arc.x, simulate(aged(PORTABLE), (0.3, 0.0), (0.0, 2.0)).x)
+
+
+def fall(t, x, p):
+    """The rate of a quantity that falls."""
+    return (-x.q,)
+
+
+def more(t, x, p):
+    """One more of it."""
+    return {"q": x.q + 1.0}
+
+
+PORTABLE = HybridSystem(
+    state=("q",),
+    modes=[Mode("fall", fall)],
+    transitions=[Transition("fall", "fall", After(0.7), Reset(more))],
+)
 
 
 def test_a_name_that_is_taken_is_left_alone():
