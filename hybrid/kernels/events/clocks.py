@@ -88,6 +88,15 @@ def leads_to_part(model, transition):
     return onward and model.enters[transition] == 0
 
 
+@njit(**IN_ORDER)
+def keep_entry(model, run):
+    """Keep the time at which the mode has been entered: now, or as long ago as the state says."""
+    run.entry_cycle, run.entry_phase, run.entry_low = run.cycle, run.phase, run.phase_low
+    if model.age >= 0:
+        run.entry_phase, lost = sum_in_two_parts(run.phase, -run.y[model.age])
+        run.entry_low += lost
+
+
 @njit(**KERNEL)
 def wind(model, run):
     """Wind up the clocks of the mode that has just been entered.
@@ -101,7 +110,7 @@ def wind(model, run):
     entered = starts or model.enters[run.last_fired] == 1
     moved = not starts and model.whole_mode[run.previous_mode] != model.whole_mode[mode]
     if entered:
-        run.entry_cycle, run.entry_phase, run.entry_low = run.cycle, run.phase, run.phase_low
+        keep_entry(model, run)
     for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
         transition = model.clocks[slot]
         own = model.tick_of[transition]

@@ -4,6 +4,7 @@ import math
 import pickle
 from fractions import Fraction
 
+import attrs
 import numpy as np
 import pytest
 
@@ -312,9 +313,34 @@ def test_a_marker_does_not_enter_a_mode():
     assert arc.jumps.t == pytest.approx([0.3, 0.4])
 
 
-def test_tangent_vectors_refuse_after():
-    with pytest.raises(ArgumentError, match="tangent vectors do not know when its mode was entered"):
-        hybrid.simulate(neuron(), (0.0,), (0.0, 1.0), tangent=True)
+@pytest.mark.parametrize("backwards", [False, True])
+def test_copies_of_a_clock_have_one_tick(backwards):
+    """A mode that has been split is left to the part in which the state lies, whichever copy comes first."""
+    system = hybrid.split(
+        HybridSystem(
+            state=("v", "spikes"),
+            modes=[
+                Mode("rise", lambda t, x, p: (1.5 - x.v + 0.5 * np.maximum(x.v - 0.5, 0.0), 0.0)),
+                Mode("rest", lambda t, x, p: (0.0, 0.0)),
+            ],
+            transitions=[
+                Transition(
+                    "rise", "rest", Guard(lambda t, x, p: x.v - 1, 1), Reset(loop_reset), name="spike"
+                ),
+                Transition("rest", "rise", After(0.7), name="again"),
+            ],
+            start="rise",
+        )
+    )
+    order = system.transitions[::-1] if backwards else system.transitions
+    arc = hybrid.simulate(attrs.evolve(system, transitions=order), (0.0, 0.0), (0.0, 20.0))
+    assert {jump.target for jump in arc.jumps["again"]} == {"rise: v<0.5", "rise: v>0.5"}
+    assert arc["spikes"][-1] == len(arc.jumps["spike"]) > 20
+
+
+def loop_reset(t, x, p):
+    """Low and high by turns."""
+    return {"v": 0.8 * (x.spikes % 2), "spikes": x.spikes + 1}
 
 
 def test_multipliers_of_a_switched_coil():
