@@ -26,7 +26,7 @@ def converter() -> PeriodicOrbit:
     system = models.buck_converter()
     given = {"E": 20.0}
     arc = simulate(system, (12.0, 0.5, 0.0), (0.0, 0.08), mode="on", parameters=given)
-    return periodic_orbit(system, arc.x[-1], mode=str(arc.mode[-1]), period=4e-4, parameters=given)
+    return periodic_orbit(system, arc.x[-1], mode=str(arc.mode[-1]), parameters=given)
 
 
 def timed(run: Callable[[], Any]) -> tuple[Any, float]:

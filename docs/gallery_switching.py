@@ -38,7 +38,7 @@ def bifurcations_of_the_converter(axes: Axes) -> None:
     period = system.parameters["T"]
     start, mode = np.array([12.0, 0.6, 0.0]), "off"
     for E in np.linspace(24.0, 34.0, 201):
-        arc = simulate(system, start, (0.0, 80.5 * period), mode=mode, parameters={"E": E}, solver=FAST)
+        arc = simulate(system, start, (0.0, 80 * period), mode=mode, parameters={"E": E}, solver=FAST)
         start, mode = arc.x[-1], str(arc.mode[-1])
         begins = arc.jumps.x_plus[arc.jumps.x_plus[:, 2] == 0.0, 0][-60:]
         axes.plot(np.full(len(begins), E), begins, ".", color=COLOURS[0], markersize=1.2, markeredgewidth=0.0)

@@ -103,6 +103,8 @@ def place(path: Path) -> Path:
     known = OUTSIDE.get(path.relative_to(ROOT).as_posix())
     if known:
         return Path(known)
+    if path.parent == ROOT / "models":
+        return Path("models", f"{path.stem}.md")
     return path.relative_to(HERE) if HERE in path.parents else Path(path.name)
 
 

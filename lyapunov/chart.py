@@ -21,7 +21,8 @@ from hybrid.simulation.trajectory import Trajectory
 from hybrid.solvers import Solver
 from hybrid.sweep.rows import At, Place, Rows, rows_of
 from hybrid.sweep.sheet import Labels
-from lyapunov.spectrum import Estimate, Means, first_vectors, interval_length
+from hybrid.transform.aged import aged
+from lyapunov.spectrum import Estimate, Means, first_vectors, interval_length, orthonormal_at_start
 
 if TYPE_CHECKING:
     import xarray
@@ -158,6 +159,7 @@ class Exponents:
 
     def _row(self, rows: Rows, point: Mapping[str, float], place: Place | None) -> dict[str, Any]:
         trajectory = rows.begin(point, place, self._vectors, rows.system)
+        orthonormal_at_start(trajectory)
         estimate = Estimate(trajectory, self._length(trajectory))
         means = estimate.run(self.transient, self.intervals, False, silent())
         found = {
@@ -236,9 +238,10 @@ class Exponents:
             return np.full((self.points, rows.system.dimension), np.nan)
         if rows.marked is not rows.system:
             # The system with the surface goes on from here; with a period the phase is all of the time.
-            place, now = (means.x, means.mode), float(trajectory.run.phase)
+            place, now = (trajectory.x, means.mode), float(trajectory.run.phase)
+            system = rows.marked if trajectory.system.age is None else aged(rows.marked)
             try:
-                marked = rows.go_on(point, place, None, rows.marked, now)
+                marked = rows.go_on(point, place, None, system, now)
             except HybridError:
                 return np.full((self.points, rows.system.dimension), np.nan)
             marked.goes_on_from(trajectory)

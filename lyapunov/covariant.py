@@ -18,8 +18,10 @@ from hybrid.simulation.ending import status_of
 from hybrid.simulation.labelled import Names, attributes, with_counters
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
+from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
-from lyapunov.spectrum import first_vectors, interval_length
+from hybrid.transform.aged import aged
+from lyapunov.spectrum import generic_directions, interval_length
 
 if TYPE_CHECKING:
     import xarray
@@ -28,6 +30,9 @@ if TYPE_CHECKING:
 @attrs.frozen(eq=False, repr=False)
 class CovariantVectors:
     """Covariant Lyapunov vectors at the starts of ``N`` intervals of one orbit.
+
+    If a mode has an `hybrid.After`, states and vectors have the time since the entry as their last component
+    but for counters.
 
     Attributes
     ----------
@@ -180,7 +185,8 @@ def covariant_vectors(
     >>> bool(abs(found.exponents[0] - 0.5) < 1e-6)
     True
     """
-    basis = first_vectors(system, None)
+    n = aged(as_system("system", system)).tangent_dimension
+    basis = generic_directions(n, n)
     intervals = arguments.count("intervals", intervals, 1)
     transient = arguments.count("transient", transient, 0)
     progress = arguments.flag("progress", progress)

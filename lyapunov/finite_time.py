@@ -16,6 +16,7 @@ from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
+from hybrid.transform.aged import aged, least_dimension
 from lyapunov.spectrum import interval_length
 
 STARTS = "be a state (n,) or states of shape (N, n)"
@@ -47,7 +48,8 @@ def finite_time_exponents(
     system, mode, parameters, t0, solver
         As for :func:`hybrid.simulate`.
     x0
-        A start ``(n,)``, or starts ``(N, n)``.
+        A start ``(n,)``, or starts ``(N, n)``. Held components and counters come last and may be left out:
+        they are 0 then.
     interval
         The time :math:`T`; by default as for :func:`lyapunov.lyapunov_spectrum`.
     intervals
@@ -77,12 +79,12 @@ def finite_time_exponents(
     array([ 0.5, -0.5])
     """
     as_system("system", system)
-    starts = arguments.numbers("x0", x0, STARTS)
+    starts = system.variables.completed(arguments.numbers("x0", x0, STARTS))
     count = 1 if intervals is None else arguments.count("intervals", intervals, 1)
     one = starts.ndim == 1
     if not one:
         _check(system, starts)
-    found = np.full((1 if one else len(starts), count, system.tangent_dimension), np.nan)
+    found = np.full((1 if one else len(starts), count, least_dimension(system)), np.nan)
     failures = []
     for i, each in enumerate(starts[None] if one else starts):
         try:
@@ -93,7 +95,7 @@ def finite_time_exponents(
                 mode=mode,
                 parameters=parameters,
                 solver=solver,
-                tangent=np.eye(system.tangent_dimension),
+                tangent=np.eye(aged(system).tangent_dimension),
             )
             _fill(found[i], trajectory, interval_length(trajectory, interval, count))
         except HybridError as failure:
@@ -111,13 +113,14 @@ def _check(system: HybridSystem, starts: np.ndarray) -> None:
     bad = np.flatnonzero(~np.isfinite(starts).all(axis=1))
     if bad.size:
         raise ArgumentError(f"x0 must be finite; got x0[{bad[0]}] = {starts[bad[0]].tolist()}.")
+    system.variables.check_counts("x0", starts)
 
 
 def _fill(out: np.ndarray, trajectory: Trajectory, length: float) -> None:
     """Write the exponents of intervals of this length into ``out (intervals, n)``."""
-    begin, n = trajectory.t, out.shape[1]
+    begin, units = trajectory.t, np.ones(trajectory.system.tangent_dimension)
     for i in range(len(out)):
-        factors = fundamental_factors(trajectory, begin + (i + 1) * length, np.ones(n))
+        factors = fundamental_factors(trajectory, begin + (i + 1) * length, units)
         whole = all(np.all(np.isfinite(each)) for each in factors.matrices)
         if factors.code != codes.DONE or not whole:
             return
@@ -125,4 +128,4 @@ def _fill(out: np.ndarray, trajectory: Trajectory, length: float) -> None:
         count = len(factors.matrices)
         product = [*factors.matrices, *(each.T for each in reversed(factors.matrices))]
         singular = [*factors.singular, *(2 * count - 1 - k for k in factors.singular)]
-        out[i] = product_eigenvalues(product, singular).log_moduli / (2 * length)
+        out[i] = product_eigenvalues(product, singular).log_moduli[: out.shape[1]] / (2 * length)

@@ -124,7 +124,7 @@ def distances(
     completed. Each run takes ``burst`` steps at most; after ``MAX_STEPS`` the interval that was not completed
     is ``resumed`` by the next call.
     """
-    run, period, n = task.run, task.model.period, task.model.dimension
+    run, period, n = task.run, task.model.period, task.model.controlled
     most = min(max_steps, run.steps + burst)
     free_most = min(max_steps, free.run.steps + burst)
     renormalised_most = min(max_steps, renormalised.run.steps + burst)

@@ -31,6 +31,7 @@ from hybrid.simulation.periods import check_time
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.growth import growing
+from hybrid.transform.aged import aged, least_dimension, original_of, without_age
 from lyapunov.batches import EMPTY, closed_batch_means
 from lyapunov.interval import END, end_at, sums_layout
 from lyapunov.per_transition import JumpRates, PerTransition
@@ -59,7 +60,8 @@ class LyapunovSpectrum:
         in 95 % of runs. Too wide on regular motion.
     sum_rule
         Required sum of the exponents if ``k = n``: the time average of div f plus the mean log-determinant
-        of the saltation matrices per unit time, along the same orbit and with the same weights.
+        of the saltation matrices per unit time, along the same orbit and with the same weights. nan where
+        some modes have an `hybrid.After` and others have none: entries forget the age.
     growths
         ``(intervals, k)``: growth rate of each direction over each interval; empty with ``history=False``.
     interval, intervals
@@ -204,7 +206,8 @@ def lyapunov_spectrum(
     system, x0, mode, parameters, solver
         As for :func:`hybrid.simulate`.
     k
-        Number of exponents, 1 to n; all by default, since only all of them have a sum rule.
+        Number of exponents, 1 to n; all by default, since only all of them have a sum rule. If every mode has
+        an `hybrid.After`, the time since the entry is one more direction.
     intervals, interval
         Number of intervals to average over, and their length; by default the forcing period, or for an
         autonomous system the time scale of its field at the start: the reciprocal of the spectral radius of
@@ -246,6 +249,7 @@ def lyapunov_spectrum(
     transient = arguments.count("transient", transient, 0)
     history, progress = arguments.flag("history", history), arguments.flag("progress", progress)
     trajectory = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=vectors)
+    orthonormal_at_start(trajectory)
     length = interval_length(trajectory, interval, transient + intervals)
     load_kernels("lyapunov.kernels")
     with trajectory.stop, progress_bar(transient + intervals, "Lyapunov spectrum", progress) as bar:
@@ -253,10 +257,18 @@ def lyapunov_spectrum(
 
 
 def first_vectors(system: HybridSystem, k: int | None) -> np.ndarray:
-    """Tangent vectors ``(n, k)`` to start with; all ``n`` for None."""
-    n = compile_system(system).system.tangent_dimension
-    directions = n if k is None else arguments.count("k", k, 1, n, ", the dimension of the state")
-    return generic_directions(n, directions)
+    """Tangent vectors ``(n, k)`` to start with, with the age last; None for as many as all modes have."""
+    system = compile_system(system).system
+    most = least_dimension(system)
+    directions = most if k is None else arguments.count("k", k, 1, most, ", the dimension of the state")
+    return generic_directions(aged(system).tangent_dimension, directions)
+
+
+def orthonormal_at_start(trajectory: Trajectory) -> None:
+    """Make the tangent vectors of a run orthonormal again where its mode takes the age from them."""
+    if trajectory.system.age is not None:
+        trajectory.replace_tangents(trajectory.tangent_matrix)
+        trajectory.replace_tangents(np.linalg.qr(trajectory.tangent_matrix)[0])
 
 
 def interval_length(trajectory: Trajectory, interval: float | None, intervals: int) -> float:
@@ -341,7 +353,7 @@ class Estimate:
         """The spectrum over ``intervals`` intervals, after ``transient`` intervals."""
         found: dict[str, Any] = self.run(transient, intervals, history, bar)._asdict()
         values, batches = found.pop("values"), found.pop("batches")
-        system = self.trajectory.system
+        system = original_of(self.trajectory.system)
         return LyapunovSpectrum(
             **found,
             interval=self.interval,
@@ -352,7 +364,7 @@ class Estimate:
     def run(self, transient: int, intervals: int, history: bool, bar: Progress) -> Means:
         """What is found over ``intervals`` intervals, after ``transient`` intervals."""
         trajectory, k = self.trajectory, self.trajectory.tangents
-        code = codes.DONE
+        system, code = trajectory.system, codes.DONE
         if transient:
             _, code = self._collect(transient, None, False, bar)
             self.sums.batch_state[:] = EMPTY
@@ -371,13 +383,13 @@ class Estimate:
         return Means(
             values[:k],
             error,
-            float(values[k]),
+            float(values[k]) if least_dimension(system) == system.tangent_dimension else math.nan,
             growths,
             mean.count,
             (trajectory.run.jumps - jumps) / count,
             (trajectory.run.steps - steps) / count,
             trajectory.mode,
-            trajectory.x,
+            without_age(original_of(system), trajectory.x),
             self._status(code, count),
             values,
             means,
@@ -436,6 +448,7 @@ class Estimate:
             kept = vectors[~gone]
             basis, _ = np.linalg.qr(np.vstack([kept, generic_directions(n, n)]).T)
             vectors[gone] = basis[:, len(kept) : len(vectors)].T
+            orthonormal_at_start(self.trajectory)
 
     def _status(self, code: int, intervals: int) -> Status:
         status = status_of(self.trajectory, code)

@@ -20,8 +20,10 @@ from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
-from hybrid.system.graph import as_system, refuse_counters
+from hybrid.system.entries import has_age
+from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
+from hybrid.transform.aged import aged, with_age
 from lyapunov.interval import end_at
 from lyapunov.spectrum import INTERVALS_AT_ONCE, interval_length
 
@@ -166,8 +168,8 @@ def two_orbit_exponents(
         lengths over which the model is nonlinear, and well above the solver's tolerances and the rounding of
         the state. Distances near the tolerance show the steps of the two runs, not the separation of orbits.
     direction
-        ``(n,)``: direction from the reference to the companion, of any length; by default all components are
-        equal.
+        ``(n,)`` without counters: direction from the reference to the companion, of any length; by default
+        all components are equal.
     intervals, interval
         Number of intervals to follow the orbits, and their length; by default the forcing period, or for an
         autonomous system the time scale of its field at the start.
@@ -208,9 +210,9 @@ def two_orbit_exponents(
     transient = arguments.count("transient", transient, 0)
     separation = arguments.positive("separation", separation, "be a positive distance")
     progress = arguments.flag("progress", progress)
-    refuse_counters(system, "two_orbit_exponents")
-    reference = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver)
-    offset = separation * _unit_vector(direction, system)
+    state = with_age(system, system.variables.state_values("x0", x0))
+    reference = start(aged(system), state, t0, mode=mode, parameters=parameters, solver=solver)
+    offset = separation * _direction(direction, system, reference)
     length = interval_length(reference, interval, transient + intervals)
     unit = Names(system.state_names, system.units).rate.get("units", "")
     load_kernels("lyapunov.kernels")
@@ -265,10 +267,20 @@ def _log_ratio(distances: np.ndarray, before: np.ndarray | float) -> np.ndarray:
         return np.subtract(logs, np.log(before), out=np.full_like(logs, -np.inf), where=known)
 
 
-def _unit_vector(direction: ArrayLike | None, system: HybridSystem) -> np.ndarray:
-    n = system.dimension
-    if direction is None:
-        return np.full(n, 1.0 / math.sqrt(n))
+def _direction(direction: ArrayLike | None, system: HybridSystem, reference: Trajectory) -> np.ndarray:
+    """The unit vector from the reference to its companion: none of its parts is along a counter."""
+    whole, n = reference.system, system.tangent_dimension
+    found = np.zeros(whole.dimension)
+    if direction is not None:
+        found[:n] = _unit_vector(direction, n)
+        return found
+    moves = whole.age is not None and has_age(whole, reference.mode)
+    n += 1 if moves and system.age is None else 0
+    found[:n] = 1.0 / math.sqrt(n)
+    return found
+
+
+def _unit_vector(direction: ArrayLike, n: int) -> np.ndarray:
     vector = arguments.numbers("direction", direction, f"be a finite vector of shape ({n},), not zero")
     largest = np.abs(vector).max(initial=0.0)
     if vector.shape != (n,) or not 0.0 < largest < math.inf:

@@ -1,16 +1,21 @@
 """Models ready to simulate, one file each; every factory returns a :class:`hybrid.HybridSystem`."""
 
 from models.ball_chain import ball_chain
+from models.battery_cell import battery_cell
 from models.bilinear_oscillator import bilinear_oscillator
+from models.boost_converter import boost_converter
 from models.bouncing_ball import bouncing_ball
 from models.bouncing_table import bouncing_table
 from models.buck_converter import buck_converter
 from models.chua_circuit import chua_circuit
+from models.dosing_schedule import dosing_schedule
 from models.dry_friction_oscillator import dry_friction_oscillator
 from models.impact_oscillator import impact_oscillator
 from models.impact_pair import impact_pair
+from models.refractory_neuron import refractory_neuron
 from models.rimless_wheel import rimless_wheel
 from models.rocking_block import rocking_block
+from models.sampled_loop import sampled_loop
 from models.simplest_walker import simplest_walker
 from models.slip_hopper import slip_hopper
 from models.solvable_oscillator import solvable_oscillator
@@ -22,17 +27,22 @@ from models.vibroimpact import vibroimpact
 
 __all__ = [
     "ball_chain",
+    "battery_cell",
     "bilinear_oscillator",
+    "boost_converter",
     "bouncing_ball",
     "bouncing_table",
     "buck_converter",
     "chua_circuit",
     "coulomb_stick_slip",
+    "dosing_schedule",
     "dry_friction_oscillator",
     "impact_oscillator",
     "impact_pair",
+    "refractory_neuron",
     "rimless_wheel",
     "rocking_block",
+    "sampled_loop",
     "simplest_walker",
     "slip_hopper",
     "solvable_oscillator",

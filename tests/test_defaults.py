@@ -41,6 +41,7 @@ DEFAULTS = {
     hybrid.HybridSystem: {
         "held": (),
         "counters": (),
+        "listed_order": False,
         "transitions": (),
         "start": None,
         "period": None,

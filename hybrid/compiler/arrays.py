@@ -10,6 +10,7 @@ import numpy as np
 
 from hybrid.kernels.types.codes import AT
 from hybrid.system.elements import Transition
+from hybrid.system.entries import enters_anew
 from hybrid.system.graph import HybridSystem
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def leaving(system: HybridSystem, chosen: Callable[[Transition], bool]) -> tuple
     return indices(accumulate(map(len, of_modes), initial=0)), indices(chain.from_iterable(of_modes))
 
 
-def clock_arrays(system: HybridSystem, emitted: Emitted) -> dict[str, np.ndarray]:
+def clock_arrays(system: HybridSystem, emitted: Emitted) -> dict[str, Any]:
     """The fields of ``hybrid.kernels.types.layout.Model`` that tell of clocks."""
     transitions = system.transitions
     first_clock, clocks = leaving(system, lambda each: each.clock is not None)
@@ -49,7 +50,8 @@ def clock_arrays(system: HybridSystem, emitted: Emitted) -> dict[str, np.ndarray
         "tick_of": indices(_first_like(len(transitions), lambda i: _own_name(transitions[i]))),
         "clock_of": indices(_first_like(len(transitions), clock_of)),
         "whole_mode": indices(system.whole_modes.index(each.part_of or each.name) for each in system.modes),
-        "enters": indices(_enters(system, each) for each in transitions),
+        "enters": indices(enters_anew(system, each) for each in transitions),
+        "age": -1 if system.age is None else system.age,
     }
 
 
@@ -62,12 +64,3 @@ def _first_like(count: int, key: Callable[[int], Any]) -> list[int]:
     """For each of so many items the first one with the same key."""
     first: dict[Any, int] = {}
     return [first.setdefault(key(i), i) for i in range(count)]
-
-
-def _enters(system: HybridSystem, transition: Transition) -> bool:
-    """Whether a transition enters its target anew: not if it marks, or leads to another part of its mode."""
-    if transition.target is None or transition.is_marker:
-        return False
-    source, target = map(system.mode_index, (transition.source, transition.target))
-    whole, other = system.modes[source].part_of, system.modes[target].part_of
-    return transition.part_of is not None or whole is None or whole != other

@@ -294,6 +294,7 @@ class CompiledSystem:
             parameters=self.with_tables(system.parameter_values()),
             **{**_no_knots(len(system.modes)), **self.knots_at(system.parameter_values())},
             dimension=system.dimension,
+            controlled=system.tangent_dimension,
             first_outgoing=first_outgoing,
             outgoing=outgoing,
             first_at_start=first_at_start,

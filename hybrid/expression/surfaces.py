@@ -7,6 +7,7 @@ from typing import Any
 
 import attrs
 
+from hybrid.expression.derivatives import derivative
 from hybrid.expression.graph import is_larger_than, mentions
 from hybrid.expression.implications import MOST_TERMS, follows
 from hybrid.expression.nodes import HALF, ONE, Expression, Symbol, number
@@ -20,8 +21,27 @@ QUARTER = number(0.25)
 DIGITS = 12
 
 
-# What a surface that is both ends of a pulse keeps: see ``Surface.pulse``.
-Pulse = tuple[Expression, Expression, int]
+@attrs.frozen
+class Sawtooth:
+    """The fraction of ``over / by``, cut where the remainder of ``over`` by ``by`` passes ``cut``.
+
+    ``above`` is the side of a surface, -1 or 1, on which the remainder exceeds ``cut``.
+    """
+
+    over: Expression
+    by: Expression
+    cut: Expression
+    above: int
+
+    @property
+    def argument(self) -> Expression:
+        """What the fraction is of."""
+        return self.over / self.by
+
+    @property
+    def level(self) -> Expression:
+        """Where the fraction is cut, between 0 and 1."""
+        return self.cut / self.by
 
 
 @attrs.frozen
@@ -38,14 +58,14 @@ class Surface:
     argument
         For a floor its argument, whose fraction is below 1/2 above the surface; else None.
     pulse
-        For both ends of a pulse, ``u``, ``d`` and the side on which the fraction of ``u`` exceeds ``d``.
+        For both ends of a pulse, the sawtooth that it is cut from.
     """
 
     height: Expression
     core: str
     level: float
     argument: Expression | None = None
-    pulse: Pulse | None = None
+    pulse: Sawtooth | None = None
 
 
 class Surfaces:
@@ -54,7 +74,9 @@ class Surfaces:
     def __init__(self, symbols: Symbols) -> None:
         self.symbols = symbols
         self.known: list[Surface] = []
-        self.pulses: dict[str, Pulse] = {}
+        self.pulses: dict[str, Sawtooth] = {}
+        # By arguments of floors that come from remainders: what is divided, and by what.
+        self.quotients: dict[Expression, tuple[Expression, Expression]] = {}
         self._implied: dict[Any, int | None] = {}
 
     def find(self, height: Expression, argument: Expression | None = None) -> tuple[int, int]:
@@ -67,6 +89,19 @@ class Surfaces:
             height, argument = -height, None if argument is None else -argument
         self.known.append(Surface(height, core, level, argument, self.pulses.get(core)))
         return len(self.known) - 1, orientation
+
+    def is_timed(self, u: Expression) -> bool:
+        """Whether an expression is affine in time, and else made of numbers and parameters."""
+        t, states = self.symbols.t, self.symbols.x
+        return mentions(u, (t,)) and not mentions(u, states) and not mentions(derivative(u, t), (t,))
+
+    def sawtooth(self, number: int) -> Sawtooth | None:
+        """The sawtooth that a surface cuts; of a floor, at its half."""
+        surface = self.known[number]
+        if surface.argument is None:
+            return surface.pulse
+        over, by = self.quotients.get(surface.argument, (surface.argument, ONE))
+        return Sawtooth(over, by, by / 2, -1)
 
     def match(self, height: Expression) -> tuple[int, int] | None:
         """As `find`, but None if the surface has not been found before."""
@@ -122,13 +157,18 @@ class Surfaces:
         return None
 
 
+def is_negative(factor: Expression) -> bool:
+    """Whether a number or a product is negative if its symbols are positive."""
+    return (factor.is_number or factor.is_product) and factor.leads_with_minus
+
+
 def _linear(surface: Surface) -> Expression:
     """What has the sign of a height and is linear in a floor, if the surface belongs to one."""
     if surface.argument is not None:
         return Floor(surface.argument) + HALF - surface.argument
     if surface.pulse is not None:
-        u, level, above = surface.pulse
-        return above * (u - Floor(u) - level)
+        u = surface.pulse.argument
+        return surface.pulse.above * (u - Floor(u) - surface.pulse.level)
     return surface.height
 
 
@@ -139,7 +179,7 @@ def _facts(surface: Surface, side: int) -> list[tuple[Expression, int]]:
     is its level. The same is taken for the branch of that side on the surface itself.
     """
     facts = [(surface.height, side)]
-    u = surface.argument if surface.pulse is None else surface.pulse[0]
+    u = surface.argument if surface.pulse is None else surface.pulse.argument
     if u is None or side == 0:
         return facts
     direction = 1 if side > 0 else -1

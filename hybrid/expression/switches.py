@@ -58,7 +58,7 @@ from hybrid.expression.operations import (
 )
 from hybrid.expression.polynomials import expanded, ratio
 from hybrid.expression.ranges import range_of
-from hybrid.expression.surfaces import QUARTER, Surfaces, core_of, moves
+from hybrid.expression.surfaces import QUARTER, Sawtooth, Surfaces, core_of, is_negative, moves
 from hybrid.expression.tracing import Symbols
 
 COMPARISONS = (Less, LessEqual, Equal)
@@ -140,7 +140,7 @@ class Switches:
     def _stage(self, entries: tuple[Expression, ...], used: dict[int, int]) -> _Stage:
         """The stage that these expressions are in, up to the first switch whose side is not known."""
         while (atom := _first_atom(entries, self.surfaces.symbols)) is not None:
-            branch = _rewritten(atom, self.surfaces.symbols)
+            branch = _rewritten(atom, self.surfaces)
             if branch is None:
                 height, argument = _height(atom)
                 height, sign = self._simpler(height, used)
@@ -213,7 +213,7 @@ def _first_atom(entries: Sequence[Expression], symbols: Symbols) -> Expression |
     return None
 
 
-def _rewritten(atom: Expression, symbols: Symbols) -> Expression | None:
+def _rewritten(atom: Expression, surfaces: Surfaces) -> Expression | None:
     """An atom in terms of simpler ones; None if it is a simple one."""
     if isinstance(atom, Equal):
         # It holds on a surface only, not beside it.
@@ -223,6 +223,7 @@ def _rewritten(atom: Expression, symbols: Symbols) -> Expression | None:
         return Floor(a / b)
     if isinstance(atom, Remainder):
         a, b = atom.args
+        surfaces.quotients[a / b] = a, b
         return a - b * Floor(a / b)
     if isinstance(atom, TruncatedRemainder):
         a, b = atom.args
@@ -230,7 +231,7 @@ def _rewritten(atom: Expression, symbols: Symbols) -> Expression | None:
     if isinstance(atom, Truncate):
         [u] = atom.args
         return Select(Less(u, ZERO), Ceiling(u), Floor(u))
-    return _fixed(atom, symbols)
+    return _fixed(atom, surfaces.symbols)
 
 
 def _fixed(atom: Expression, symbols: Symbols) -> Expression | None:
@@ -269,28 +270,41 @@ def _pulse(height: Expression, surfaces: Surfaces) -> Expression | None:
     """A smooth height with the sign of ``g*(u - floor(u)) + c``; None if a height is not of this form."""
     if is_larger_than(MOST_TERMS, height):
         return None
-    quotients = {node: a - b * Floor(a / b) for node in nodes_of(Remainder, height) for a, b in [node.args]}
+    remainders = nodes_of(Remainder, height)
+    quotients = {node: a - b * Floor(a / b) for node in remainders for a, b in [node.args]}
     height = expanded(replaced(height, quotients))
     floors = nodes_of(Floor, height)
     if len(floors) != 1 or contains(height, Level):
         return None
     [floor] = floors
-    [u], share = floor.args, Symbol("share")
+    [u], share, variables = floor.args, Symbol("share"), surfaces.symbols.variables
     slope = -derivative(replaced(height, {floor: share}), share)
-    if slope is ZERO or contains(u, SWITCHING) or mentions(slope, (share, *surfaces.symbols.variables)):
+    if slope is ZERO or contains(u, SWITCHING) or mentions(slope, (share, *variables)):
         return None
     constant = expanded(height - slope * (u - floor))
+    given = (node.args for node in remainders)
+    over, by = next(((a, b) for a, b in given if expanded(a / b) is expanded(u)), (u, ONE))
     level = ratio(-constant, slope) if constant is not ZERO else ZERO
-    if level is None:
-        return None
-    if not 0 < level.value < 1:
+    if level is not None and not 0 < level.value < 1:
         return slope if level.value <= 0 else -slope
-    middle = number(2.0 * math.pi) * (u - level / 2)
-    # cos(pi*d), which is zero for half a turn.
-    pulse = slope * (number(math.sin(math.pi * (0.5 - float(level)))) - Cos(middle))
-    if slope.is_number:
+    cut, timed = -constant * (by / slope), surfaces.is_timed(u)
+    steepness = slope
+    if timed and not slope.is_number:
+        # The period of a sawtooth of time is positive: its clock refuses any other.
+        steepness = -slope / by if is_negative(by) else slope / by
+    if level is None and (mentions(cut, variables) or not (timed and steepness.is_number)):
+        return None
+    if level is None:
+        level = Minimum(Maximum(cut / by, ZERO), ONE)
+        edge: Expression = Cos(number(math.pi) * level)
+    else:
+        # cos(pi*d), which is zero for half a turn.
+        edge = number(math.sin(math.pi * (0.5 - float(level))))
+    factor = number(math.copysign(1.0, steepness.value)) if steepness.is_number else slope
+    pulse = factor * (edge - Cos(number(2.0 * math.pi) * (u - level / 2)))
+    if factor.is_number:
         core, _, orientation = core_of(pulse, surfaces.symbols)
-        surfaces.pulses[core] = u, level, orientation if slope.value > 0 else -orientation
+        surfaces.pulses[core] = Sawtooth(over, by, cut, orientation if factor.value > 0 else -orientation)
     return pulse
 
 

@@ -138,7 +138,7 @@ def gets_on(model, method, run, remaining):
     Beside a place where the field jumps or ends, steps may be as short as the tolerances, and the state stays
     within them. Short steps that lead somewhere get on, and so does any run that makes jumps.
     """
-    for i in range(model.dimension if run.stretch_moved == 0 else 0):
+    for i in range(model.controlled if run.stretch_moved == 0 else 0):
         y, start = run.y[i], run.stretch[i]
         if abs(y - start) > OF_STATE * max(abs(y), abs(start)) + MANY_STEPS * method.atol:
             run.stretch_moved = 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import attrs
@@ -20,8 +20,10 @@ from hybrid.simulation.plan import check_solver
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver, Taylor
 from hybrid.status import Status
+from hybrid.system.entries import has_age
 from hybrid.system.graph import HybridSystem
 from hybrid.system.periodicity import whole_turns
+from hybrid.transform.aged import original_of
 
 if TYPE_CHECKING:
     import xarray
@@ -42,7 +44,8 @@ class PeriodicOrbit:
     Attributes
     ----------
     system, parameters
-        The model, and the values of all its parameters, by name.
+        The model, and the values of all its parameters, by name. If the point lies in a mode that an
+        `hybrid.After` leaves, it is the model with the time since the entry as one more component, ``age``.
     x0, mode, t0
         A point of the orbit ``(n,)``, its mode, and the time there.
     period
@@ -138,7 +141,11 @@ class PeriodicOrbit:
             arguments.known("names: Parameter", name, self.system.parameters, "Parameters")
         method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
         place = place_on(self, tuple(given), np.ones(len(given)), method)
-        return sensitivity_of(place, self.t0)
+        found, age = sensitivity_of(place, self.t0), place.family.system.age
+        if age is None or self.system.age is not None:
+            return found
+        x0 = np.delete(found.x0, age, axis=0)
+        return attrs.evolve(found, x0=x0, multipliers=found.multipliers[:-1])
 
     def arc(self, solver: Solver | None = None) -> HybridArc:
         """The orbit over one period; if it jumps at its point, from just after these jumps."""
@@ -151,6 +158,27 @@ class PeriodicOrbit:
 
     def _run(self, x: np.ndarray, t: float, end: float, mode: str, solver: Solver | None) -> HybridArc:
         return simulate(self.system, x, (t, end), mode=mode, parameters=self.parameters, solver=solver)
+
+
+def unaged(orbits: Sequence[PeriodicOrbit]) -> list[PeriodicOrbit]:
+    """The orbits without the age, if the age counts for nothing at all of their points.
+
+    It then has no part in their states, and the multiplier zero.
+    """
+    age = orbits[0].system.age if orbits else None
+    if age is None or any(has_age(orbit.system, orbit.mode) for orbit in orbits):
+        return [*orbits]
+    return [
+        attrs.evolve(
+            orbit,
+            system=original_of(orbit.system),
+            x0=np.delete(orbit.x0, age),
+            multipliers=orbit.multipliers[:-1],
+            log_moduli=orbit.log_moduli[:-1],
+            fundamental=np.delete(np.delete(orbit.fundamental, age, axis=0), age, axis=1),
+        )
+        for orbit in orbits
+    ]
 
 
 def turns_over(system: HybridSystem, change: np.ndarray) -> dict[str, int]:

@@ -12,13 +12,14 @@ from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
 from hybrid.orbits.newton import Point
-from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.orbits.orbit import PeriodicOrbit, unaged
 from hybrid.orbits.shooting import Shooting
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import DOP853, Solver
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.growth import growing
+from hybrid.transform.aged import aged, with_age
 
 
 @growing
@@ -51,7 +52,7 @@ def periodic_orbit(
         As for :func:`hybrid.simulate`.
     x0, mode
         Guess of a point of the orbit ``(n,)``, and the mode there. If the orbit of a forced system jumps at
-        ``t0``, its point is the state before the jump.
+        ``t0``, its point is the state before the jump. At the guess its mode is entered.
     t0, periods
         Time at the guess, and number of forcing periods (forced systems).
     period
@@ -95,7 +96,9 @@ def periodic_orbit(
     as_system("system", system)
     periods = arguments.count("periods", periods, 1)
     max_iterations = arguments.count("max_iterations", max_iterations, 0)
-    guess, counters = np.split(system.variables.state_values("x0", x0), [system.tangent_dimension])
+    state = with_age(system, system.variables.state_values("x0", x0))
+    system = aged(system)
+    guess, counters = np.split(state, [system.tangent_dimension])
     t0 = arguments.number("t0", t0)
     tolerance = arguments.positive("tolerance", tolerance, "be above 0 and below 1")
     if not tolerance < 1.0:
@@ -111,7 +114,7 @@ def periodic_orbit(
         point = Point(guess, t0, periods * forcing)
         compile_system(system)
         with CTRL_C:
-            return _kept(shooting.hinted(shooting.newton(point, False, tolerance, max_iterations), point))
+            return _shown(shooting.hinted(shooting.newton(point, False, tolerance, max_iterations), point))
     if period is None:
         raise ArgumentError("An autonomous system needs a guess of its period: give period=.")
     length = arguments.positive("period", period)
@@ -120,11 +123,12 @@ def periodic_orbit(
     compile_system(system)
     with CTRL_C:
         point = Point(guess, t0, length)
-        return _kept(shooting.hinted(shooting.autonomous(point, tolerance, max_iterations), point))
+        return _shown(shooting.hinted(shooting.autonomous(point, tolerance, max_iterations), point))
 
 
-def _kept(orbit: PeriodicOrbit) -> PeriodicOrbit:
-    """The orbit, with a status that says so if the search was interrupted."""
+def _shown(orbit: PeriodicOrbit) -> PeriodicOrbit:
+    """The orbit as a result, with a status that says so if the search was interrupted."""
+    [orbit] = unaged([orbit])
     if not CTRL_C.is_set():
         return orbit
     return attrs.evolve(orbit, status=interrupted_status("the best point so far"))

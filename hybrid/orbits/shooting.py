@@ -23,6 +23,7 @@ from hybrid.simulation.simulate import simulate
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode, noting
+from hybrid.system.entries import has_age
 from hybrid.system.graph import HybridSystem, functions_of
 from hybrid.system.periodicity import angle_fault_at, closed_change
 
@@ -114,7 +115,7 @@ class Shooting:
 
     def _trajectory(self, point: Point, mode: str | None) -> Trajectory:
         """A run from a point that carries the columns of the identity."""
-        return start(
+        trajectory = start(
             self.system,
             self.whole(point),
             point.t,
@@ -123,6 +124,9 @@ class Shooting:
             solver=self.solver,
             tangent=np.eye(self.system.tangent_dimension),
         )
+        # Where the age counts for nothing, its column is zero.
+        trajectory.replace_tangents(trajectory.tangent_matrix)
+        return trajectory
 
     def newton(self, point: Point, free_period: bool, tolerance: float, max_iterations: int) -> PeriodicOrbit:
         """Newton's method from ``point``; the period may be unknown too.
@@ -246,11 +250,20 @@ class Shooting:
         arc = self._follow(guess, 2 * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
         jumps = np.concatenate([[0.0], arc.jumps.t - guess.t])
         candidates = np.linspace(0, guess.period, 201)[1:-1]
+        at = np.searchsorted(arc.t, guess.t + candidates, side="right") - 1
+        candidates = candidates[self._is_ageless(arc.mode[at])]
         distance = np.minimum(
             np.abs(candidates[:, None] - jumps).min(axis=1),
             np.abs(candidates[:, None] + guess.period - jumps).min(axis=1),
         )
         return float(candidates[np.argmax(distance)])
+
+    def _is_ageless(self, modes: np.ndarray) -> np.ndarray:
+        """In which of these modes the state has no age, ``(N,)``; all count if it has one everywhere."""
+        system = self.system
+        ageless = [mode for mode in system.mode_names if system.age is None or not has_age(system, mode)]
+        found = np.isin(modes, ageless)
+        return found | ~found.any()
 
     def _moved(self, guess: Point, shift: float) -> tuple[Shooting, Point]:
         arc = self._follow(guess, shift, self.mode)
@@ -284,7 +297,8 @@ class Shooting:
         apart = (states - guess.x) / np.where(extent > 0, extent, 1.0)
         times = arc.jumps.t
         # On a jump, rounding would decide whether a run from the point makes it.
-        away = [np.all(np.abs(times - t) > POINT_ERROR * orbit.period) for t in arc.t]
+        away = np.array([np.all(np.abs(times - t) > POINT_ERROR * orbit.period) for t in arc.t])
+        away &= self._is_ageless(arc.mode)
         i = int(np.argmin(np.where(away, np.linalg.norm(apart, axis=1), np.inf)))
         return attrs.evolve(orbit, x0=arc.x[i], mode=str(arc.mode[i]), t0=float(arc.t[i]))
 

@@ -34,11 +34,11 @@ def plot_graph(
 ) -> Axes:
     """Draw the mode graph: modes as boxes, transitions as arrows, with the directions of their guards.
 
-    A label's upward arrow means that the guard rises through zero, a downward arrow that it falls. Dashed
-    edges reset the state; grey edges of dashes and dots lead to the limit of a chatter. Modes have the same
-    colours as in the other plots. A dot is the end of a run. Transitions that only fire at the start of a run
-    are left out. In a graph of more than a few modes, the transitions between the same two modes share an
-    arrow, and names such as ``a->b`` are not repeated on it.
+    A label's upward arrow means that the guard rises through zero, a downward arrow that it falls. The label
+    of a clock says when it ticks. Dashed edges reset the state; grey edges of dashes and dots lead to the
+    limit of a chatter. Modes have the same colours as in the other plots. A dot is the end of a run.
+    Transitions that only fire at the start of a run are left out. In a graph of more than a few modes, the
+    transitions between the same two modes share an arrow, and names such as ``a->b`` are not repeated on it.
 
     Parameters
     ----------
@@ -113,15 +113,16 @@ class _Edge:
         return self.transition.source, END if target is None else target
 
     def label(self, *, short: bool = False) -> str:
-        """The name and the direction of the guard; short without the modes in the name."""
+        """The name, and the direction of the guard or when the clock ticks; short without names of modes."""
         transition = self.transition
         if self.is_limit:
             return f"limit of {transition.name}"
-        direction = DIRECTIONS[transition.guard.direction]
-        name = transition.name
+        name, clock = transition.name, transition.clock
+        fires = DIRECTIONS[transition.guard.direction] if clock is None else clock.told
         if short and name.startswith(f"{transition.source}->{transition.target}"):
-            return direction
-        return f"{name.removeprefix(f'{transition.source}: ')} {direction}"
+            return fires
+        name = name.removeprefix(f"{transition.source}: ")
+        return f"{name} {fires}" if clock is None else f"{name} ({fires})"
 
     @property
     def style(self) -> dict[str, Any]:
@@ -171,14 +172,15 @@ def _places(graph: nx.MultiDiGraph) -> dict[str, np.ndarray]:
 
 
 def _key(system: HybridSystem) -> str:
-    key = "↑ guard rises through zero   ↓ falls"
+    guarded = [transition for transition in system.transitions if transition.clock is None]
+    key = "↑ guard rises through zero   ↓ falls" if guarded or not system.transitions else ""
     if any(transition.guard.direction == 0 for transition in system.transitions):
         key += "   ↕ either"
     if any(transition.reset is not None for transition in system.transitions):
         key += "   dashed: resets the state"
     if any(transition.accumulates_to is not None for transition in system.transitions):
         key += "   dashes and dots: limit of chatter"
-    return key
+    return key.lstrip()
 
 
 def _draw_mode(ax: Axes, mode: str, place: np.ndarray, colour: str) -> Any:

@@ -43,6 +43,8 @@ class ErrorBounds(Protocol):
 def plot_jumps(jumps: Jumps, *, ax: Axes | None = None, figsize: tuple[float, float] | None = None) -> Axes:
     """Draw jumps over time: one row per transition, dots for grazings, triangles for limits of chatter.
 
+    The row of a clock says when it ticks.
+
     Parameters
     ----------
     jumps
@@ -74,7 +76,10 @@ def plot_jumps(jumps: Jumps, *, ax: Axes | None = None, figsize: tuple[float, fl
             if len(at):
                 ax.plot(at, np.full(len(at), row), marker, color=colour_of(row), markersize=7)
     seen = [kind for kind in MARKS if np.any(jumps.kind == kind)]
-    ax.set_yticks(range(len(fired)), fired)
+    clocks = [jumps.system.transitions[jumps.system.transition_index(name)].clock for name in fired]
+    pairs = zip(fired, clocks, strict=True)
+    labels = [name if clock is None else f"{name} ({clock.told})" for name, clock in pairs]
+    ax.set_yticks(range(len(fired)), labels)
     ax.set_ylim(max(len(fired), 1) - 0.5, -0.5)
     ax.set_xlabel(Names(jumps.system.state_names, jumps.system.units).label("t"))
     plain(ax)

@@ -282,6 +282,22 @@ class HybridArc:
         return states.reshape(*times.shape, self.system.dimension)
 
 
+def without_component(arc: HybridArc, i: int, system: HybridSystem) -> HybridArc:
+    """The arc of a system that lacks component ``i``, which has tangent vectors, of that of the run."""
+    fundamental, jumps, pieces = arc.fundamental, arc._jumps, arc._pieces
+    if pieces is not None:
+        pieces = attrs.evolve(pieces, blocks=[np.delete(each, i, axis=2) for each in pieces.blocks])
+    return attrs.evolve(
+        arc,
+        system=system,
+        x=np.delete(arc.x, i, axis=1),
+        jumps=None if jumps is None else jumps.without_component(i, system),
+        grazings=tuple(attrs.evolve(each, x=np.delete(each.x, i)) for each in arc.grazings),
+        fundamental=None if fundamental is None else np.delete(fundamental, i, axis=0),
+        pieces=pieces,
+    )
+
+
 def hybrid_points(
     system: HybridSystem, pieces: Pieces, jumps: Jumps, end: tuple[float, np.ndarray, int]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

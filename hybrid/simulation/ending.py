@@ -58,7 +58,8 @@ def _carries_plainly(trajectory: Trajectory) -> bool:
 
 def _notes(trajectory: Trajectory, code: int) -> list[str]:
     """What is told besides the status, with or without tangent vectors; ``is_plain`` names the reasons."""
-    notes = [*_start_beyond(trajectory), *_held(trajectory), *_run_dry(trajectory, code)]
+    notes = [*_start_beyond(trajectory), *_miscounted(trajectory), *_held(trajectory)]
+    notes += _run_dry(trajectory, code)
     return [*notes, *_unproved(trajectory), *_unresolved(trajectory), *_unbounded(trajectory)]
 
 
@@ -81,6 +82,22 @@ def _start_beyond(trajectory: Trajectory) -> Iterator[str]:
             f"The start lies beyond the guard of {names}. This guard counts as crossed, so only its next "
             "crossing fires. For an event before the mode is entered, give the mode before a transition with "
             "the same guard."
+        )
+
+
+def _miscounted(trajectory: Trajectory) -> Iterator[str]:
+    """A note on counters that a run has made other than whole numbers."""
+    system = trajectory.system
+    counts = trajectory.x[system.tangent_dimension :].tolist()
+    told = [
+        f"{name!r} is {count:.6g}"
+        for name, count in zip(system.counters, counts, strict=True)
+        if not count.is_integer()
+    ]
+    if told:
+        yield (
+            f"A counter is a whole number, and {', '.join(told)} at the end. It has no tangent vectors and "
+            "no tolerance: make it one of the held components."
         )
 
 
@@ -199,7 +216,8 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     if code in (StatusCode.INTERRUPTED, StatusCode.OUT_OF_MEMORY):
         return run_status(code, _place(trajectory), None, bare_time=False)
     run = trajectory.run
-    singular, ambiguous = run.singular_jumps, run.order_mattered
+    singular = run.singular_jumps
+    ambiguous = 0 if trajectory.system.listed_order else run.order_mattered
     grazed = run.ill_conditioned if trajectory.tangents else 0
     if trajectory.tangents and singular:
         return Status(
@@ -235,7 +253,8 @@ def _status(trajectory: Trajectory, code: int) -> Status:
             StatusCode.AMBIGUOUS_ORDER,
             f"{ambiguous} times two guards were reached together and the order of their transitions "
             f"mattered; the one listed first was fired first.{also}",
-            "Choose the order in which the transitions are listed, or add one for the corner.",
+            "Choose the order in which the transitions are listed and declare "
+            "HybridSystem(listed_order=True), or add one for the corner.",
         )
     if code == codes.DONE and grazed:
         return _grazed(trajectory, grazed)

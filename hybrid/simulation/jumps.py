@@ -243,6 +243,11 @@ class Jumps(Sequence[Jump]):
         )
         return matrices
 
+    def without_component(self, i: int, system: HybridSystem) -> Jumps:
+        """The jumps of a system that lacks component ``i``, which has tangent vectors, of that of the run."""
+        matrices = np.delete(np.delete(self._recorded, i, axis=1), i, axis=2)
+        return attrs.evolve(self, system=system, states=np.delete(self._states, i, axis=2), recorded=matrices)
+
     def to_xarray(self) -> xarray.Dataset:
         """The jumps over the axis ``jump``: times, transitions, kinds, states before and after."""
         import xarray

@@ -20,7 +20,7 @@ from hybrid.simulation.memory import MOST_LAYOUTS, Memory, no_record, run_layout
 from hybrid.solvers import Solver, Taylor
 from hybrid.solvers.tableau import SERIES_NODES, SERIES_WEIGHTS
 from hybrid.status import StatusCode
-from hybrid.system.graph import HybridSystem, ticks_of
+from hybrid.system.graph import ticks_of
 
 DEFAULT_SOLVER = Taylor()
 
@@ -110,8 +110,6 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: i
     plan = compiled.plans.get((solver, tangents, by_steps))
     if plan is None:
         system = compiled.system
-        if tangents:
-            _check_entries(system)
         load_kernels("hybrid.kernels.events.initial_mode")
         n, modes, transitions = system.dimension, len(system.modes), len(system.transitions)
         kinds = propagator_kinds(compiled, solver, tangents)
@@ -144,17 +142,6 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: i
             compiled.plans.pop(next(iter(compiled.plans)), None)
         compiled.plans[solver, tangents, by_steps] = plan
     return plan
-
-
-def _check_entries(system: HybridSystem) -> None:
-    """ArgumentError if tangent vectors would need to know when a mode was entered."""
-    named = [each.name for each in system.transitions if each.clock and each.clock.number == codes.AFTER]
-    if named:
-        raise ArgumentError(
-            f"Transition {named[0]!r}: tangent vectors do not know when its mode was entered, which After "
-            "counts from. For derivatives, exponents and multipliers give the state a component of rate 1 in "
-            "that mode that is reset to 0 where the mode is entered, and in place of After a Guard on it."
-        )
 
 
 def _task(attempts: Any, model: Any, method: Any, tangents: int) -> Any:

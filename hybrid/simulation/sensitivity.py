@@ -15,6 +15,7 @@ from hybrid.simulation.trajectory import start
 from hybrid.solvers import Solver
 from hybrid.status import apart_status
 from hybrid.system.functions import guard_function
+from hybrid.transform.aged import aged, with_age
 from hybrid.transform.extended import extended, with_parameters
 from hybrid.transform.restricted import restricted
 
@@ -30,6 +31,8 @@ class Sensitivities:
     ----------
     names
         Names of the parameters.
+    components
+        Those of a tangent vector ``(n,)`` that the run itself has: not the age.
     arc
         The run of the extended system.
     jumps
@@ -37,9 +40,9 @@ class Sensitivities:
     """
 
     names: tuple[str, ...]
+    components: np.ndarray
     arc: HybridArc
     jumps: Jumps | None
-    dimension: int
     x0: np.ndarray
     mode: str
     t0: float
@@ -51,13 +54,13 @@ class Sensitivities:
     def end(self) -> np.ndarray:
         """Derivatives ``(n, m)`` of the last state in the parameters."""
         assert self.arc.fundamental is not None
-        return self.arc.fundamental[: self.dimension]
+        return self.arc.fundamental[self.components]
 
     @cached_property
     def sampled(self) -> np.ndarray:
         """Derivatives ``(N, n, n + m)`` of the samples in the start and in the parameters."""
         assert self.samples is not None
-        return np.stack([tangents[: self.dimension] for _, tangents in self._at(self.samples)])
+        return np.stack([self._of_run(tangents[self.components]) for _, tangents in self._at(self.samples)])
 
     @cached_property
     def times(self) -> np.ndarray:
@@ -73,7 +76,17 @@ class Sensitivities:
         for k in range(1, len(jumps)):
             if jumps.t[k] == jumps.t[k - 1] and jumps.kind[k] != "limit":
                 found[k] = found[k - 1]
-        return found
+        return self._of_run(found)
+
+    def _of_run(self, rows: np.ndarray) -> np.ndarray:
+        """Derivatives in the start of the run itself and in the parameters, from those in all components."""
+        places = np.arange(rows.shape[-1])
+        return rows[..., np.isin(places, self.components) | (places >= self._first)]
+
+    @property
+    def _first(self) -> int:
+        """The component at which the parameters begin."""
+        return self.arc.system.tangent_dimension - len(self.names)
 
     def _at(self, times: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """The state at each time, and the tangent vectors ``(n + m, n + m)`` there."""
@@ -102,8 +115,9 @@ class Sensitivities:
         index = system.transition_index(jump.transition)
         function = guard_function(system.transitions[index])
         values = system.parameter_values(self.arc.parameters)
-        last = self.dimension + len(self.names)
-        place = with_parameters(system, jump.x_minus, self.x0[self.dimension : last])
+        first, last = self._first, system.tangent_dimension
+        before = jump.x_minus if self.jumps is None else with_age(self.jumps.system, jump.x_minus)
+        place = with_parameters(system, before, self.x0[first:last])
         slope = compile_system(system).derivative(function, index, jump.t, place, values)[0, :last]
         assert run.fundamental is not None
         return -(slope @ run.fundamental) / jump.transversality
@@ -125,9 +139,12 @@ def with_sensitivities(
 
     If that run has other jumps, both are right within the tolerances, and the status says so.
     """
-    system = extended(arc.system, names)
-    n, m = arc.system.tangent_dimension, len(names)
-    begin = with_parameters(system, x0, np.array([arc.parameters[name] for name in names]))
+    whole = aged(arc.system)
+    system, n, m = extended(whole, names), whole.tangent_dimension, len(names)
+    own = np.arange(arc.system.tangent_dimension)
+    begin = with_parameters(
+        system, with_age(arc.system, x0), np.array([arc.parameters[name] for name in names])
+    )
     parameters = {name: value for name, value in arc.parameters.items() if name not in names}
     again = simulate(
         system,
@@ -139,8 +156,8 @@ def with_sensitivities(
         tangent=np.eye(n + m)[:, n:],
         max_jumps=max_jumps,
     )
-    own = arc.jumps if arc.keeps_jumps else None
-    known = Sensitivities(names, again, own, n, begin, mode, t_span[0], samples, solver, simulate)
+    jumps = arc.jumps if arc.keeps_jumps else None
+    known = Sensitivities(names, own, again, jumps, begin, mode, t_span[0], samples, solver, simulate)
     status = arc.status
     # How many jumps of a chatter are followed, up to its limit, is no property of the run.
     apart = again.jump_count != arc.jump_count and "limit" not in again.jumps.kind
@@ -148,5 +165,5 @@ def with_sensitivities(
         status = apart_status(arc.jump_count, again.jump_count)
     elif status.ok and not again.status.ok:
         status = again.status
-    jumps = None if own is None else attrs.evolve(own, sensitivities=known)
+    jumps = None if jumps is None else attrs.evolve(jumps, sensitivities=known)
     return attrs.evolve(arc, jumps=jumps, sensitivities=known, status=status)

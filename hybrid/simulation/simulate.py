@@ -13,7 +13,7 @@ from hybrid import arguments
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
-from hybrid.simulation.arc import HybridArc, Pieces, hybrid_points, join
+from hybrid.simulation.arc import HybridArc, Pieces, hybrid_points, join, without_component
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.jumps import Grazing, Jumps
 from hybrid.simulation.memory import empty_record, memory_for_records, record_layout
@@ -126,6 +126,11 @@ def simulate(
     begun = (trajectory.x, trajectory.mode) if names else None
     arc = _Recorder(trajectory, times, t1, bool(keep_jumps)).run(t1, most)
     trajectory.release()
+    age = arc.system.age
+    if age is not None and system.age is None:
+        # The age was there for the tangent vectors alone.
+        arc = without_component(arc, age, system)
+        begun = None if begun is None else (np.delete(begun[0], age), begun[1])
     if begun is None:
         return arc
     return with_sensitivities(

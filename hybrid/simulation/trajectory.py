@@ -19,8 +19,10 @@ from hybrid.simulation.memory import Memory, put_tangents
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import Plan, check_solver, plan_of
 from hybrid.solvers import Solver
+from hybrid.system.entries import has_age
 from hybrid.system.graph import HybridSystem, as_system, starting_mode
 from hybrid.system.growth import Unexplored
+from hybrid.transform.aged import aged, with_age
 
 
 def start(
@@ -42,7 +44,8 @@ def start(
     Without a ``mode`` the system says where a run starts. The guards do if it does not, or with
     ``by_guards``.
 
-    ``tangent`` is an ``(n, k)`` matrix of tangent vectors, or None for a run without any. ``time`` is the
+    ``tangent`` is an ``(n, k)`` matrix of tangent vectors, or None for a run without any. With them the run
+    is one of the aged system, in which they know when a mode was entered. ``time`` is the
     name of the argument that ``t0`` comes from, ``horizon`` how long the run takes, 0 if that is not known,
     ``stop`` who may end the run early.
     """
@@ -52,13 +55,33 @@ def start(
     mode = mode if by_guards else starting_mode(system, mode)
     if system.growth is not None:
         explore(system, t0, state, system.parameter_values(parameters), mode)
+    system, state, tangent = directed(system, state, tangent)
     common = Common(compile_system(system), check_solver(solver), tangent, t0, time, horizon, stop)
     return common.begin(state, mode, lambda plan, memory: common.compiled.given(parameters, plan.model))
 
 
+def directed(
+    system: HybridSystem, state: np.ndarray, tangent: np.ndarray | None
+) -> tuple[HybridSystem, np.ndarray, np.ndarray | None]:
+    """What runs with these tangent vectors: with any, the aged system from a state where a mode is entered.
+
+    Vectors may have a part along the age.
+    """
+    if tangent is None or aged(system) is system:
+        return system, state, tangent
+    if len(tangent) == system.tangent_dimension:
+        tangent = with_age(system, tangent.T).T
+    return aged(system), with_age(system, state), tangent
+
+
 def explore(system: HybridSystem, t0: float, state: np.ndarray, values: np.ndarray, mode: str | None) -> None:
     """Unexplored if modes of a growing system in which a run may start have been made only now."""
-    if system.growth is not None and system.growth.place(t0, state, values, mode):
+    growth = system.growth
+    if growth is None:
+        return
+    # A run on a later stage of the system may have told the mode.
+    later = mode not in system.mode_names and mode in growth.current.mode_names
+    if later or growth.place(t0, state, values, mode):
         raise Unexplored(mode)
 
 
@@ -183,7 +206,12 @@ class Trajectory:
         return self.run.y[n:].reshape(self.tangents, n)[:, : self.system.tangent_dimension].T.copy()
 
     def replace_tangents(self, matrix: np.ndarray) -> None:
-        """Go on with other tangent vectors, the columns of ``(n, k)``."""
+        """Go on with other tangent vectors, the columns of ``(n, k)``.
+
+        Where the age of the mode counts for nothing, they have no part along it.
+        """
+        if self.system.age is not None and not has_age(self.system, self.mode):
+            matrix = matrix * (np.arange(len(matrix)) != self.system.age)[:, None]
         put_tangents(self.run.y, self.model.dimension, matrix)
         if self.run.stage == codes.READY:
             self.run.stage = codes.STALE

@@ -64,7 +64,8 @@ def simulate_many(
         As for :func:`hybrid.simulate`, the same for all starts.
     x0
         Starts ``(N, n)``; or a mapping of each component to a number or to ``N`` numbers. A DataArray or
-        a DataFrame with the names of the components as a coordinate or as columns is read by these.
+        a DataFrame with the names of the components as a coordinate or as columns is read by these. Held
+        components and counters come last and may be left out: they are 0 then.
     samples
         Increasing times at which to store the state. A step ends at each of them.
     executor
@@ -129,12 +130,13 @@ def _origins(system: HybridSystem, x0: Any) -> np.ndarray:
         except ValueError:
             raise arguments.refusal("x0", STARTS, x0) from None
     else:
-        states = arguments.numbers("x0", x0, STARTS)
+        states = system.variables.completed(arguments.numbers("x0", x0, STARTS))
     if states.ndim != 2 or states.shape[1] != system.dimension:
         raise ArgumentError(f"x0 must {STARTS}, here n = {system.dimension}; got shape {states.shape}.")
     bad = np.flatnonzero(~np.isfinite(states).all(axis=1))
     if bad.size:
         raise ArgumentError(f"x0 must be finite; got x0[{bad[0]}] = {states[bad[0]].tolist()}.")
+    system.variables.check_counts("x0", states)
     return np.ascontiguousarray(states)
 
 

@@ -19,7 +19,7 @@ from hybrid.orbits.sections import crossings, strobe
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.labelled import Names
 from hybrid.simulation.plan import check_solver, plan_of
-from hybrid.simulation.trajectory import Common, Trajectory, explore
+from hybrid.simulation.trajectory import Common, Trajectory, directed, explore
 from hybrid.solvers import Solver
 from hybrid.sweep.points import as_points
 from hybrid.sweep.sheet import Labels
@@ -27,6 +27,7 @@ from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, as_system, check_mode, starting_mode
 from hybrid.system.growth import Unexplored
 from hybrid.system.labels import by_label, named, plain_name
+from hybrid.transform.aged import aged, without_age
 from hybrid.transform.markers import with_section
 
 # Where the points of a section are taken: per forcing period, at crossings of a surface, or at each jump.
@@ -86,7 +87,8 @@ class Rows:
     def prepare(self, tangents: int) -> None:
         """Compile and load all that the rows need, so that threads do not do so at the same time."""
         load_kernels("hybrid.kernels.events.sections")
-        for system, count in {(self.system, tangents), (self.system, 0), (self.marked, 0)}:
+        with_tangents = aged(self.system) if tangents else self.system
+        for system, count in {(with_tangents, tangents), (self.system, 0), (self.marked, 0)}:
             plan_of(compile_system(system), self.solver, count)
 
     def begin(
@@ -116,6 +118,7 @@ class Rows:
         state, values = place[0], self.values(point)
         mode = starting_mode(system, place[1])
         explore(system, t0, state, values, mode)
+        system, state, tangent = directed(system, state, tangent)
         return Common(compile_system(system), self.solver, tangent, t0).begin_at(state, mode, values)
 
     def values(self, point: Mapping[str, float]) -> np.ndarray:
@@ -149,7 +152,7 @@ class Rows:
         status_of(trajectory, code)
         if code != codes.DONE:
             return None
-        return trajectory.x, trajectory.mode
+        return without_age(self.system, trajectory.x), trajectory.mode
 
     def section(self, trajectory: Trajectory, points: int) -> tuple[np.ndarray, int]:
         """The next points of the section ``(points, n)``, filled up with nan, and the code of the run."""
@@ -165,7 +168,7 @@ class Rows:
             plain = attrs.evolve(trajectory, tangents=0)
             _, found, _, _, code = crossings(plain, counted, points)
         status_of(trajectory, code)
-        states[: len(found)] = found[:points]
+        states[: len(found)] = without_age(self.system, found[:points])
         return states, code
 
     def facts(self) -> dict[str, Any]:

@@ -62,7 +62,8 @@ class Since:
 
     def __call__(self, t: Any, x: Any, p: Any) -> Any:
         """The time since the nearest tick, negative before it."""
-        return self.clock._since_tick(t, self.clock._numbers(x, p))
+        age = self.clock.age
+        return self.clock._since_tick(t if age is None else x[age], self.clock._numbers(x, p))
 
 
 @attrs.frozen
@@ -78,6 +79,9 @@ class Clock(Portable):
     direction: ClassVar[int] = 1
     gradient: ClassVar[None] = None
     at_start: ClassVar[bool] = False
+    counts_from_entry: ClassVar[bool] = False
+    # The component of the state that is the time since the entry of the mode, if there is one.
+    age: ClassVar[int | None] = None
 
     # The clock as a guard.
     function: Callable[..., Any] = attrs.field(
@@ -270,7 +274,9 @@ class After(Clock):
     """A clock that ticks once, so long after its mode was entered, in the place of a guard.
 
     The start of a run is an entry. A transition from the mode to itself enters it anew, unless it has no
-    reset and so changes nothing.
+    reset and so changes nothing. For derivatives, the time since the entry is one more component of the
+    state, the age; orbits and branches whose points lie in such a mode show it as their last component but
+    for counters.
 
     Parameters
     ----------
@@ -295,6 +301,7 @@ class After(Clock):
     duration: Quantity = attrs.field(converter=_as_duration)
     when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=_check_when)
     number: ClassVar[int] = 3
+    counts_from_entry: ClassVar[bool] = True
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -323,16 +330,23 @@ class DerivedClock(Clock):
     """A clock in a system that was made from another one.
 
     ``read(x, p)`` gives its numbers, from a state that may hold what were parameters, or in other units.
+    ``age`` is the component of the state that is the time since the entry of the mode, if there is one.
     """
 
     clock: Clock
     read: Callable[[Any, Any], Sequence[Any]]
     when: Callable[..., Any] | None
+    age: int | None = None  # type: ignore[misc]
 
     @property
     def number(self) -> int:  # type: ignore[override]
         """That of the original."""
         return self.clock.number
+
+    @property
+    def counts_from_entry(self) -> bool:  # type: ignore[override]
+        """As the original."""
+        return self.clock.counts_from_entry
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:

@@ -53,6 +53,8 @@ def _heading(system: Any) -> list[str]:
         lines.insert(2, f"time: {with_unit('t', units['t'])}")
     if system.start is not None:
         lines.append(f"start: {system.start!r}")
+    if system.listed_order:
+        lines.append("listed order: decides where guards are reached together")
     if system.angles:
         turns = ", ".join(f"{name} turns in {turn:.6g}" for name, turn in system.angles.items())
         lines.append(f"angles: {turns}")

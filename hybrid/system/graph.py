@@ -22,7 +22,7 @@ from hybrid.system.laws import Laws, placed
 from hybrid.system.periodicity import Period, period_at
 from hybrid.system.portable import Portable
 from hybrid.system.switching import switching_inside
-from hybrid.system.variables import Variables, as_names, as_parameters, as_state
+from hybrid.system.variables import Variables, as_counters, as_held, as_parameters, as_state
 from hybrid.system.watched import Watched
 
 if TYPE_CHECKING:
@@ -37,12 +37,8 @@ def _as_transitions(value: Iterable[Transition]) -> tuple[Transition, ...]:
     return tuple(arguments.items("HybridSystem: transitions", value, "be a list of Transition objects"))
 
 
-def _as_held(value: Any) -> tuple[str, ...]:
-    return as_names(value, "held")
-
-
-def _as_counters(value: Any) -> tuple[str, ...]:
-    return as_names(value, "counters")
+def _as_listed_order(value: object) -> bool:
+    return arguments.flag("HybridSystem: listed_order", value)
 
 
 def _as_period(value: Any) -> Any:
@@ -102,6 +98,9 @@ class HybridSystem(Portable):
         Default values by name; any call may override them.
     modes, transitions
         Nodes and edges. If guards are crossed at the same time, the transition listed first fires.
+    listed_order
+        Whether the order of ``transitions`` is meant to decide where guards are reached together. Otherwise
+        the status of a run says AMBIGUOUS_ORDER if another order would have led elsewhere.
     start
         Name of the mode that a run starts in if the call names none. In a system that has been split it may
         be a mode from before: the run starts in the part that the state lies in.
@@ -172,11 +171,13 @@ class HybridSystem(Portable):
     """
 
     state: tuple[str, ...] | int = attrs.field(kw_only=True, converter=as_state)
-    held: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=_as_held)
-    counters: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=_as_counters)
+    held: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=as_held)
+    counters: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=as_counters)
     parameters: Mapping[str, float] = attrs.field(factory=dict, kw_only=True, converter=as_parameters)
     modes: tuple[Mode, ...] = attrs.field(kw_only=True, converter=_as_modes)
     transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=_as_transitions)
+    # It decides no result, but what the status says of one.
+    listed_order: bool = attrs.field(default=False, kw_only=True, converter=_as_listed_order, repr=False)
     period: Period = attrs.field(default=None, kw_only=True, converter=_as_period)
     start: str | None = attrs.field(default=None, kw_only=True)
     name: str = attrs.field(default="", kw_only=True, validator=_name)
@@ -195,6 +196,10 @@ class HybridSystem(Portable):
     )
     # Cache of compile_system, with the lifetime of the system.
     _compiled: Any = attrs.field(default=None, init=False, repr=False)
+    # The system with the time since the entry of a mode as a component, with the same lifetime.
+    _aged: Any = attrs.field(default=None, init=False, repr=False)
+    # The function that has made this system from another one, and that one.
+    _made_by: Any = attrs.field(default=None, init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
         object.__setattr__(self, "units", self.variables.as_units(self.units))
@@ -203,6 +208,12 @@ class HybridSystem(Portable):
         unchecked = self._unchecked()
         check_functions(self.variables, unchecked, self.period)
         check_angles(self.variables, unchecked, self.turn_lengths)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self._made_by is None:
+            return Portable.__reduce__(self)
+        function, original = self._made_by
+        return function, (original,)
 
     @property
     def is_whole(self) -> bool:
@@ -280,6 +291,19 @@ class HybridSystem(Portable):
         """By transition: the place of the first number of its clock among those of all, and their count."""
         counts = (0 if each.clock is None else len(each.clock.quantities) for each in self.transitions)
         return tuple(accumulate(counts, initial=0))
+
+    @cached_property
+    def aging(self) -> frozenset[str]:
+        """Names of the modes, or of those that they are parts of, whose clocks count from the entry."""
+        whole = {mode.name: mode.part_of or mode.name for mode in self.modes}
+        return frozenset(
+            whole[each.source] for each in self.transitions if each.clock and each.clock.counts_from_entry
+        )
+
+    @cached_property
+    def age(self) -> int | None:
+        """The component of the state that is the time since the entry of the mode, if there is one."""
+        return next((each.clock.age for each in self.transitions if each.clock and each.clock.age), None)
 
     @cached_property
     def graph(self) -> nx.MultiDiGraph:
@@ -462,13 +486,9 @@ def watched_by(system: HybridSystem) -> Watched:
     return Watched([*(each.function for each in functions), *(each.derivative for each in functions), period])
 
 
-def refuse_counters(system: HybridSystem, what: str) -> None:
-    """ArgumentError if a system has counters, from a calculation, ``what``, that compares whole states."""
-    if system.counters:
-        raise ArgumentError(
-            f"{what} compares whole states, and a counter never comes back. Leave "
-            f"{', '.join(system.counters)} out of the system."
-        )
+def watched_below(system: HybridSystem) -> Watched:
+    """The values that decide a system that is made from this one: what this one and those below it read."""
+    return watched_by(system).joined(system.derived_from)
 
 
 def as_system(name: str, value: object) -> HybridSystem:

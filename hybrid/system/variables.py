@@ -203,8 +203,7 @@ class Variables:
                 f"{name} must hold {self.dimension} numbers; got {arguments.shown(value)}. "
                 f"The state is {', '.join(names)}."
             )
-        if found.shape == (self.moving,):
-            found = np.append(found, np.zeros(self.dimension - self.moving))
+        found = self.completed(found)
         if found.shape != (self.dimension,):
             raise ArgumentError(
                 f"{name} has shape {found.shape}; the state needs shape ({self.dimension},): "
@@ -215,10 +214,21 @@ class Variables:
             pairs = zip(names, values, strict=True)
             component, bad = next(pair for pair in pairs if not isfinite(pair[1]))
             raise ArgumentError(f"{name}: component {component!r} must be finite; got {bad}.")
-        for component, number in zip(self.counters, values[self.tangent_dimension :], strict=True):
-            if not number.is_integer():
-                raise ArgumentError(f"{name}: counter {component!r} must be a whole number; got {number}.")
+        self.check_counts(name, found)
         return found
+
+    def completed(self, states: np.ndarray) -> np.ndarray:
+        """States ``(..., n)``, with 0 for what is held or counts where only the others are given."""
+        if states.ndim == 0 or states.shape[-1] != self.moving:
+            return states
+        return np.concatenate([states, np.zeros((*states.shape[:-1], self.dimension - self.moving))], axis=-1)
+
+    def check_counts(self, name: str, states: np.ndarray) -> None:
+        """ArgumentError unless the counters of the states ``(..., n)`` in the argument ``name`` are whole."""
+        for component, values in zip(self.counters, states.T[self.tangent_dimension :], strict=True):
+            if np.any(values % 1.0):
+                number = np.extract(values % 1.0, values)[0]
+                raise ArgumentError(f"{name}: counter {component!r} must be a whole number; got {number}.")
 
     def by_component(self, name: str, value: object) -> dict[str, Any] | None:
         """What the argument ``name`` gives for each component, if it has labels; else None.
@@ -296,8 +306,17 @@ def as_state(value: Any) -> tuple[str, ...] | int:
     return names
 
 
-def as_names(value: Any, what: str) -> tuple[str, ...]:
-    """Names of held components or of counters; ``what`` is the argument."""
+def as_held(value: Any) -> tuple[str, ...]:
+    """Names of held components."""
+    return _as_names(value, "held")
+
+
+def as_counters(value: Any) -> tuple[str, ...]:
+    """Names of counters."""
+    return _as_names(value, "counters")
+
+
+def _as_names(value: Any, what: str) -> tuple[str, ...]:
     if isinstance(value, str) or (
         not isinstance(value, Sequence) and not (isinstance(value, np.ndarray) and value.ndim == 1)
     ):

@@ -66,6 +66,13 @@ class Watched:
                 return False
         return not self._lists or all(_same_items(_items(held), items) for held, items in self._lists)
 
+    def joined(self, other: Watched) -> Watched:
+        """These values and others."""
+        both = Watched()
+        for name, own in vars(self).items():
+            setattr(both, name, own + getattr(other, name) if isinstance(own, list) else own)
+        return both
+
     def numbers(self) -> dict[str, float]:
         """The plain numbers that were read from modules and closures, by name."""
         places = [entry[-2:] for entry in (*self._cells, *self._items, *self._attributes)]

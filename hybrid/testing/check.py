@@ -19,6 +19,7 @@ from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
 from hybrid.solvers import Solver
 from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.labels import named
 from hybrid.system.laws import Elastic, Laws
 from hybrid.testing.case import TIGHT, Case
 from hybrid.testing.coverage import FIRES, Coverage
@@ -74,6 +75,7 @@ from hybrid.testing.saltation import (
 )
 from hybrid.testing.strategies import Ranges, all_laws, cases
 from hybrid.testing.units import UNITS, check_units
+from hybrid.transform.aged import aged
 
 # Properties of the functions, at the start of a case, and of the whole run; laws are others.
 WITHOUT_RUN = (DERIVATIVES, COMPILED, PERIOD, ANGLES, SIDES_AFTER, LIMITS, ENDS)
@@ -159,6 +161,9 @@ def check_system(
         "across": across,
         "elastic": elastic,
     }
+    if system.aging and system.age is None:
+        # Only with the time since its mode was entered does a state tell how a run goes on.
+        states, system = _with_age(states, system), aged(system)
     laws = all_laws(system, given)
     while True:
         drawn = cases(
@@ -193,6 +198,14 @@ def check_system(
     for case in aimed:
         tally.judge(case)
     return tally.report(flip is None)
+
+
+def _with_age(states: Any, system: HybridSystem) -> Any:
+    """The states to draw, where a mode is entered."""
+    age = system.tangent_dimension
+    if isinstance(states, SearchStrategy):
+        return states.map(lambda x: (*x[:age], 0.0, *x[age:]))
+    return {**named("states", states), aged(system).state_names[age]: 0.0}
 
 
 def _properties(
@@ -230,7 +243,7 @@ def _properties(
         ANGLES: bool(system.angles),
         LANDINGS: any(each.reset is not None for each in system.transitions),
         LIMITS: any(each.accumulates_to for each in system.transitions),
-        ORDER: len(system.transitions) > 1,
+        ORDER: len(system.transitions) > 1 and not system.listed_order,
     }
     properties = {name: check for name, check in properties.items() if applies.get(name, True)}
     if flip is not None:

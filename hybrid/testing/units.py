@@ -176,7 +176,8 @@ def _measured(system: HybridSystem) -> Measured:
     def guard(transition: Transition) -> Guard | Clock:
         own, when = transition.guard, transition.guard.when
         if isinstance(own, Clock):
-            return DerivedClock(own, slower(own), None if when is None else original(when, transition.source))
+            asked = None if when is None else original(when, transition.source)
+            return DerivedClock(own, slower(own), asked, own.age)
         return Guard(
             original(own.function, transition.source),
             own.direction,

@@ -79,9 +79,11 @@ def altered(system: HybridSystem) -> Altered:
 def renamed(system: HybridSystem) -> HybridSystem:
     """The system with its modes and transitions renamed to reverse their alphabetical order, cached."""
     if system not in _RENAMED:
+        # A mode that has been split, which the system may start in, keeps its name.
+        start = system.start
         _RENAMED[system] = attrs.evolve(
             system,
-            start=system.start and new_name(system.mode_names, system.start),
+            start=new_name(system.mode_names, start) if start in system.mode_names else start,
             laws=Laws(),
             modes=[attrs.evolve(mode, name=new_name(system.mode_names, mode.name)) for mode in system.modes],
             transitions=[
@@ -130,7 +132,9 @@ def _altered(system: HybridSystem) -> Altered:
         return WholeReset(reset, system.variables.components)
 
     for mode in system.modes:
-        field = mode if stay else Mode(mode.name, unaware(mode.field), jacobian=unaware(mode.jacobian))
+        field = mode
+        if not stay:
+            field = attrs.evolve(mode, field=unaware(mode.field), jacobian=unaware(mode.jacobian))
         modes += [field, attrs.evolve(field, name=mode.name + AGAIN)]
         there, back = f"into {mode.name + AGAIN}", f"back into {mode.name}"
         cuts += [

@@ -14,7 +14,7 @@ from hybrid.expression.values import TraceError
 from hybrid.system.clocks import Clock, DerivedClock, numbers_of
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeField, WholeReset
-from hybrid.system.graph import HybridSystem
+from hybrid.system.graph import HybridSystem, watched_below
 from hybrid.system.laws import Laws
 from hybrid.system.variables import PARAMETERS, STATE, named_values
 
@@ -30,7 +30,7 @@ def extended(system: HybridSystem, names: tuple[str, ...]) -> HybridSystem:
     the period depends on one of the parameters the system has none: time is a plain number.
     """
     made = _EXTENDED.setdefault(system, {})
-    if names not in made:
+    if names not in made or not made[names].derived_from.holds():
         made[names] = _Extension(system, names).system()
     return made[names]
 
@@ -65,6 +65,7 @@ class _Extension:
             laws=Laws(),
             notes=(),
             growth=None,
+            derived_from=watched_below(original),
         )
 
     def _mode(self, mode: Mode) -> Mode:
@@ -89,9 +90,9 @@ class _Extension:
         if isinstance(guard, Clock):
 
             def numbers(x: Any, p: Any, clock: Clock = guard) -> tuple[Any, ...]:
-                return numbers_of(clock, x, self._all_parameters(x, p))
+                return numbers_of(clock, self._own(x), self._all_parameters(x, p))
 
-            moved = DerivedClock(guard, numbers, when)
+            moved = DerivedClock(guard, numbers, when, guard.age)
         else:
             moved = Guard(self._function(guard.function), guard.direction, when=when, at_start=guard.at_start)
         return attrs.evolve(transition, guard=moved, reset=new)
@@ -122,13 +123,11 @@ class _Extension:
 
     def _function(self, function: Callable[..., Any]) -> Callable[..., Any]:
         """A function of the original system as one of the extended state."""
+        return lambda t, x, p: function(t, self._own(x), self._all_parameters(x, p))
+
+    def _own(self, x: Any) -> Any:
+        """The state of the original system."""
         original, first, last = self.original, self.first, self.last
-
-        def called(t: Any, x: Any, p: Any) -> Any:
-            if isinstance(original.state, int):
-                own = x[:first]
-            else:
-                own = named_values(STATE, original.state_names, (*x[:first], *x[last:]))
-            return function(t, own, self._all_parameters(x, p))
-
-        return called
+        if isinstance(original.state, int):
+            return x[:first]
+        return named_values(STATE, original.state_names, (*x[:first], *x[last:]))

@@ -45,8 +45,8 @@ class Names:
             words = self._text(surface.argument)
             name = f"mod({words},1){'>1/2' if side < 0 else '<1/2'}" if side else f"2*({words}) whole"
         elif surface.pulse is not None:
-            u, level, above = surface.pulse
-            name = f"mod({self._text(u)},1){SIGNS[side * above]}{self._text(level)}"
+            pulse = surface.pulse
+            name = f"mod({self._text(pulse.argument)},1){SIGNS[side * pulse.above]}{self._text(pulse.level)}"
         else:
             left, right = self._equation(self._without_levels(surface.height))
             name = f"{left}{SIGNS[side]}{right}"

@@ -127,6 +127,9 @@ def split(system: HybridSystem) -> HybridSystem:
     *A floor* has two modes for each of its steps' halves, with the surfaces ``sin(2 pi u) = 0``. A choice
     by floors alone, as by ``floor(t) % 2 == 0``, changes where these floors do, and makes no other modes.
 
+    *A sawtooth of time* crosses its surfaces at the ticks of an `Every`: ``mod(t, p.T) < p.d * p.T`` has two
+    modes, and so has ``mod(t, p.T)`` itself. The period must be positive.
+
     *A fractional power* of a height, as in Hertz' ``np.maximum(z, 0)**1.5``, is zero beyond its surface.
 
     References

@@ -15,7 +15,7 @@ import numpy as np
 from hybrid.errors import ModelError
 from hybrid.expression.evaluation import Program, expressed, scalar
 from hybrid.expression.graph import replaced
-from hybrid.expression.nodes import ZERO, Expression, Symbol
+from hybrid.expression.nodes import ZERO, Expression, Number, Symbol
 from hybrid.expression.operations import And, Less, LessEqual, Not, Or
 from hybrid.expression.surfaces import Surfaces
 from hybrid.expression.switches import Resolved, Switches
@@ -28,7 +28,9 @@ from hybrid.system.functions import WholeReset, field_function, moving_field
 from hybrid.system.graph import HybridSystem, watched_by
 from hybrid.transform import corners
 from hybrid.transform.cells import Cell, Choice, Pieces
+from hybrid.transform.edges import Edge, Outgoing
 from hybrid.transform.naming import Names, copy_name
+from hybrid.transform.ticks import timed
 
 # Parts may differ from the field by so much of its largest value: other orders of the same sums.
 AGREEMENT = 1e-9
@@ -36,25 +38,6 @@ AGREEMENT = 1e-9
 SIZES = (0.1, 1.0, 10.0)
 # A system of more modes than this is made in stages. Of the many modes around a mode a run visits few.
 MOST_WHOLE = 12
-
-
-@attrs.frozen
-class Edge:
-    """A transition, the cell that it leads to, and the cell for the limit of its chatter; None for none."""
-
-    transition: Transition
-    target: Cell | None
-    limit: Cell | None = None
-
-
-@attrs.frozen
-class _Outgoing:
-    """A user's transition in the expressions of its functions; None for what could not be traced."""
-
-    index: int
-    transition: Transition
-    guard: Expression | None
-    reset: list[Expression] | None
 
 
 class Splitter:
@@ -71,7 +54,7 @@ class Splitter:
         self.surfaces = Surfaces(self.symbols)
         self.names = Names(self.variables)
         self.outgoing = [
-            _Outgoing(i, each, self._guard(each), self._reset(each))
+            Outgoing(i, each, self._guard(each), self._reset(each))
             for i, each in enumerate(system.transitions)
         ]
         self.pieces = [self._pieces(i, mode) for i, mode in enumerate(system.modes)]
@@ -150,7 +133,7 @@ class Splitter:
                     )
 
     def _side(self, number: int, values: dict[Symbol, float]) -> int:
-        [height] = Program([self.surfaces.known[number].height]).run(values)
+        [height] = Program([self._asked(number)]).run(values)
         return 1 if height >= 0 else -1
 
     def _make(self, cells: Sequence[Cell], most: int) -> None:
@@ -262,7 +245,8 @@ class Splitter:
     def _arrivals(self, cell: Cell, number: int, side: int) -> Iterator[Edge]:
         """The transitions of a state that reaches a surface from one side."""
         pieces = self.pieces[cell.mode]
-        height = self._height(number)
+        height, time = self._height(number), timed(self.surfaces, number)
+        crossing: Any = time.clock(side, self.names.words) if time else Guard(height, -side)
         beyond, turns = {**dict(cell.sides), number: -2 * side}, False
         for choice in pieces.choices(beyond):
             sides = {**dict(cell.branches), **choice.sides}
@@ -273,10 +257,12 @@ class Splitter:
                     yield self._edge(cell, resting.cell, Guard(height, -side, when=_all(more)))
                 continue
             joined = cell.sliding and not corners.are_apart(pieces, sides, [*cell.sliding, number])
-            if not pieces.jumps(sides, number) or not (joined or pieces.may_attract(sides, number)):
-                yield self._edge(cell, choice.cell, Guard(height, -side, when=_all(extra)))
+            passes = not pieces.jumps(sides, number) or not (joined or pieces.may_attract(sides, number))
+            if time or not passes:
+                yield self._edge(cell, choice.cell, self._at_start(number, side, extra))
+            if passes:
+                yield self._edge(cell, choice.cell, attrs.evolve(crossing, when=_all(extra)))
                 continue
-            yield self._edge(cell, choice.cell, Guard(height, -side, when=_all(extra), at_start=True))
             if joined:
                 turns = True
                 continue
@@ -289,10 +275,18 @@ class Splitter:
             onwards = [self._condition(crosses), *extra]
             yield self._edge(cell, choice.cell, Guard(height, -side, when=_all(onwards)))
         if turns:
-            yield from self._turns(cell, Guard(height, -side), corners.arrivals(cell.sliding, number, side))
+            yield from self._turns(cell, crossing, corners.arrivals(cell.sliding, number, side))
+
+    def _at_start(self, number: int, side: int, extra: list[Expression]) -> Guard:
+        """The guard that excludes a start on the wrong side of a surface."""
+        if timed(self.surfaces, number) is None:
+            return Guard(self._height(number), -side, when=_all(extra), at_start=True)
+        # A tick at the start does not fire, so its instant belongs to one side: no rounding is allowed for.
+        beyond = [*self._on([(number, -side)]), *extra]
+        return Guard(scalar(Number(-side)), -side, when=_all(beyond), at_start=True)
 
     def _turns(
-        self, cell: Cell, guard: Guard, ways: Sequence[corners.Corner], leaving: int = -1
+        self, cell: Cell, guard: Guard | Clock, ways: Sequence[corners.Corner], leaving: int = -1
     ) -> Iterator[Edge]:
         """The transitions at an intersection of surfaces, to each cell that is consistent there.
 
@@ -310,13 +304,13 @@ class Splitter:
                     continue
                 when = corners.consistent(pieces, sides, [*corner], leaving if k == 0 else None)
                 possible.append(reduce(And, [*when, *self._on(choice.chosen)]))
-                fires = attrs.evolve(guard, when=_all([*asked, possible[-1]]))
+                fires = attrs.evolve(cast(Any, guard), when=_all([*asked, possible[-1]]))
                 yield self._edge(cell, choice.cell, fires, reset)
         where = self.names.cell(self.surfaces.known, [(number, 0) for number in ways[0]])
-        end = attrs.evolve(guard, when=_all([*asked, Not(reduce(Or, possible))]))
+        end = attrs.evolve(cast(Any, guard), when=_all([*asked, Not(reduce(Or, possible))]))
         yield Edge(Transition(source, None, end, name=f"{source}: no way on at {where}"), None)
 
-    def _edge(self, cell: Cell, target: Cell, guard: Guard, reset: Reset | None = None) -> Edge:
+    def _edge(self, cell: Cell, target: Cell, guard: Guard | Clock, reset: Reset | None = None) -> Edge:
         source, to = self.name_of(cell), self.name_of(target)
         name = f"{source}->{to} at the start" if guard.at_start else f"{source}->{to}"
         return Edge(Transition(source, to, guard, reset, name=name), target)
@@ -374,16 +368,21 @@ class Splitter:
         """Conditions that the state lies on these sides; with ``after``, the state after a reset."""
         conditions: list[Expression] = []
         for number, side in chosen:
-            height = self.surfaces.known[number].height
+            height = self._asked(number)
             if after is not None:
-                height = self._height_after(number, after)
+                height = self._after_reset(height, after)
             conditions.append(LessEqual(ZERO, height) if side > 0 else Less(height, ZERO))
         return conditions
 
-    def _height_after(self, number: int, after: Sequence[Expression]) -> Expression:
-        return replaced(self.surfaces.known[number].height, dict(zip(self.symbols.x, after, strict=True)))
+    def _asked(self, number: int) -> Expression:
+        """What has the sign of a height; of one of time alone also at the instants at which its sides end."""
+        time = timed(self.surfaces, number)
+        return time.height if time else self.surfaces.known[number].height
 
-    def _copies(self, cell: Cell, outgoing: _Outgoing) -> Iterator[Edge]:
+    def _after_reset(self, height: Expression, after: Sequence[Expression]) -> Expression:
+        return replaced(height, dict(zip(self.symbols.x, after, strict=True)))
+
+    def _copies(self, cell: Cell, outgoing: Outgoing) -> Iterator[Edge]:
         """A user's transition in one cell: one for each side that the state may land on."""
         transition = outgoing.transition
         own = self.names.cell(self.surfaces.known, cell.sides)
@@ -420,7 +419,7 @@ class Splitter:
         [value] = self._traced("a condition of a guard", condition)
         return Less(ZERO, value)
 
-    def _smooth_guard(self, cell: Cell, outgoing: _Outgoing) -> Guard | Clock:
+    def _smooth_guard(self, cell: Cell, outgoing: Outgoing) -> Guard | Clock:
         """The guard of a user's transition with the branches of a cell; as it is if it has none."""
         guard = outgoing.transition.guard
         if outgoing.guard is None or isinstance(guard, Clock):
@@ -432,7 +431,7 @@ class Splitter:
         return attrs.evolve(guard, function=scalar(result.entries[0]), gradient=None)
 
     def _after(
-        self, cell: Cell, outgoing: _Outgoing
+        self, cell: Cell, outgoing: Outgoing
     ) -> Iterator[tuple[tuple[tuple[int, int], ...], list[Expression] | None]]:
         """The states after a user's reset, for each choice of the branches that it has."""
         if outgoing.reset is None:
@@ -464,7 +463,7 @@ class Splitter:
 
     def _side_after(self, cell: Cell, number: int, after: Sequence[Expression]) -> int | None:
         """The side of a surface on which a state lands from a cell, if it is always the same."""
-        height = self._height_after(number, after)
+        height = self._after_reset(self.surfaces.known[number].height, after)
         if not height.mask:
             # On the surface itself the rules of an instant decide; the state may be on either side.
             return -1 if float(height) < 0 else 1

@@ -35,7 +35,7 @@ from tests.hybrid.arguments.values import BALL, OSCILLATOR
 def flip_of_the_converter():
     converter, given = buck_converter(), {"parameters": {"E": 20.0}}
     arc = hybrid.simulate(converter, (12.0, 0.5, 0.0), (0.0, 0.08), mode="on", **given)
-    orbit = hybrid.periodic_orbit(converter, arc.x[-1], mode=str(arc.mode[-1]), period=4e-4, **given)
+    orbit = hybrid.periodic_orbit(converter, arc.x[-1], mode=str(arc.mode[-1]), **given)
     (flip,) = hybrid.continue_orbit(orbit, "E", (15.0, 30.0)).bifurcations
     return flip
 

@@ -2,6 +2,7 @@
 
 import math
 
+import attrs
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -244,13 +245,17 @@ def test_bad_state():
 
 def test_a_clock_among_the_states_hides_nothing():
     """Nothing grows along a clock's axis; the vectors start along no axis, so the largest comes first."""
+    ramp_ends = hybrid.Guard(lambda t, x, p: x.tau - 1.0, +1)
+    converter = models.buck_converter()
+    clocked = attrs.evolve(
+        converter,
+        transitions=[
+            attrs.evolve(each, guard=attrs.evolve(ramp_ends, when=each.guard.when)) if each.clock else each
+            for each in converter.transitions
+        ],
+    )
     result = lyapunov.lyapunov_spectrum(
-        models.buck_converter(),
-        (12.03, 0.61, 0.0),
-        mode="off",
-        parameters={"E": 33.0},
-        interval=400e-6,
-        intervals=500,
+        clocked, (12.03, 0.61, 0.0), mode="off", parameters={"E": 33.0}, intervals=500
     )
     # The exponent along the orbit is zero; the first is that of the chaotic converter, per second.
     assert result.exponents[0] == pytest.approx(1200.0, abs=200.0)

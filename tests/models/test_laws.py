@@ -10,10 +10,11 @@ import models
 from hybrid import Guard, Laws, Reset
 from hybrid.testing import Case, PropertyError, check_laws, check_system
 from hybrid.testing.crossings import CROSSINGS
+from hybrid.testing.dimensions import DIMENSIONS
 from hybrid.testing.events import SIDES
 from hybrid.testing.invariance import CUT, ELASTIC
 from hybrid.testing.laws import law_checks
-from hybrid.testing.saltation import CONTINUITY
+from hybrid.testing.saltation import CONTINUITY, EXTENSION, FLOW_DIRECTION, SUM_RULE
 from models.contact import HuntCrossley, KelvinVoigt, Rigid
 
 # The models, and ranges in which they are meant to run.
@@ -26,7 +27,15 @@ RUNS = {
             "t_span": (0.0, 4.0),
         },
     ),
+    "battery_cell": (
+        models.battery_cell(),
+        {"states": {"s": (0.05, 0.5), "v1": (0.0, 0.1)}, "t_span": (0.0, 130.0)},
+    ),
     "bilinear_oscillator": (models.bilinear_oscillator(), {"t_span": (0.0, 7.0)}),
+    "boost_converter": (
+        models.boost_converter(),
+        {"states": {"i": (0.2, 1.2), "v": (12.0, 25.0), "r": 0.0}, "t_span": (0.0, 6e-4)},
+    ),
     "bouncing_ball": (models.bouncing_ball(), {"states": {"q": (0.1, 1.0)}, "t_span": (0.0, 1.5)}),
     "bouncing_table": (
         models.bouncing_table(),
@@ -35,7 +44,7 @@ RUNS = {
     "buck_converter": (
         models.buck_converter(),
         {
-            "states": {"v": (11.5, 12.8), "i": (0.2, 0.8), "tau": (0.0, 1.0)},
+            "states": {"v": (11.5, 12.8), "i": (0.2, 0.8), "tau": 0.0},
             "parameters": {
                 each: models.buck_converter().parameters[each] for each in ("V_L", "V_U", "V_ref")
             },
@@ -47,6 +56,10 @@ RUNS = {
         {"states": {"x": (-2.0, 2.0), "y": (-0.3, 0.3), "z": (-2.0, 2.0)}, "t_span": (0.0, 6.0)},
     ),
     "coulomb_stick_slip": (models.coulomb_stick_slip(), {"t_span": (0.0, 15.0)}),
+    "dosing_schedule": (
+        models.dosing_schedule(),
+        {"states": {"A": (0.0, 100.0), "c": (0.0, 3.0)}, "t_span": (0.0, 40.0)},
+    ),
     "dry_friction_oscillator": (
         models.dry_friction_oscillator(),
         {
@@ -58,6 +71,10 @@ RUNS = {
     ),
     "impact_oscillator": (models.impact_oscillator(), {"states": {"x": (-1.0, 0.7)}, "t_span": (0.0, 7.0)}),
     "impact_pair": (models.impact_pair(), {"states": {"x": (-1.5, 1.5)}, "t_span": (0.0, 8.0)}),
+    "refractory_neuron": (
+        models.refractory_neuron(),
+        {"states": {"u": (-70.0, -55.0)}, "t_span": (0.0, 60.0)},
+    ),
     "rimless_wheel": (
         models.rimless_wheel(),
         {"states": {"theta": (-0.25, 0.35), "omega": (-2.0, 2.0)}, "t_span": (0.0, 2.0)},
@@ -69,6 +86,10 @@ RUNS = {
             "parameters": {"A": (0.0, 0.3)},
             "t_span": (0.0, 2.0),
         },
+    ),
+    "sampled_loop": (
+        models.sampled_loop(),
+        {"states": {"y": (-1.0, 2.0), "u": (-1.0, 1.0), "e": (-1.0, 1.0)}, "t_span": (0.0, 1.5)},
     ),
     "simplest_walker": (
         models.simplest_walker(),
@@ -117,8 +138,20 @@ RUNS = {
 }
 # Properties of systems with a continuous event, or of elastic ones.
 UNCHECKED = {CONTINUITY, ELASTIC}
-# The flip of one depends on the time alone; the other has a transition that the state passes.
-MORE_UNCHECKED = {"solvable_oscillator": {CROSSINGS, SIDES}, "bouncing_table": {CUT}}
+# Transitions at times have no guard that the state reaches; the state passes some transitions; some resets
+# forget a component.
+TIMED = {SIDES, CROSSINGS, CUT, EXTENSION, FLOW_DIRECTION}
+MORE_UNCHECKED = {
+    "solvable_oscillator": {CROSSINGS, SIDES},
+    "bouncing_table": {CUT},
+    "buck_converter": {CUT, SUM_RULE},
+    "boost_converter": {CUT, SUM_RULE},
+    "dosing_schedule": TIMED,
+    "sampled_loop": {*TIMED, SUM_RULE},
+    "battery_cell": {FLOW_DIRECTION},
+    # The age that tangent vectors need has no unit.
+    "refractory_neuron": {DIMENSIONS},
+}
 # Few starts lead to these; a belt carries a block away from where it would slip ahead.
 RARE = {
     "dry_friction_oscillator": {"two-fold", "sliding->above"},

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import attrs
 import numpy as np
 
 import models
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition, split
+from hybrid import Every, HybridSystem, Mode, Reset, Transition, split
 from hybrid.system.elements import Function
 from models.vibroimpact import _field as vibroimpact_field
 
@@ -43,11 +41,6 @@ def pair(name: str) -> tuple[HybridSystem, HybridSystem]:
         period=model.period,
     )
     return model, split(system)
-
-
-def ramp(t: Any, x: Any, p: Any) -> Any:
-    """The end of the converter's ramp."""
-    return x.tau - 1.0
 
 
 PLAIN = {
@@ -109,6 +102,6 @@ PLAIN = {
         (11.0, 0.5, 0.0),
         0.04,
         4e-4,
-        (Transition("plain", "plain", Guard(ramp, +1), Reset(lambda t, x, p: (x.v, x.i, 0.0)), name="ramp"),),
+        (Transition("plain", "plain", Every("T"), Reset(lambda t, x, p: (x.v, x.i, 0.0)), name="ramp"),),
     ),
 }

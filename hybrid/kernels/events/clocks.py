@@ -18,7 +18,7 @@ from hybrid.kernels.arithmetic.clock import (
 )
 from hybrid.kernels.arithmetic.tables import knots_passed
 from hybrid.kernels.events.guards import allowed
-from hybrid.kernels.types.codes import AFTER, AT, EVERY, NO_TRANSITION
+from hybrid.kernels.types.codes import AFTER, AT, EVERY, NO_MODE, NO_TRANSITION
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -81,25 +81,44 @@ def first_from(model, run, transition, beyond):
         k += 1
 
 
+@njit(**INLINE)
+def leads_to_part(model, transition):
+    """Whether a transition leads to another part of its mode."""
+    onward = model.target[transition] != NO_MODE and model.marker[transition] == 0
+    return onward and model.enters[transition] == 0
+
+
+@njit(**IN_ORDER)
+def keep_entry(model, run):
+    """Keep the time at which the mode has been entered: now, or as long ago as the state says."""
+    run.entry_cycle, run.entry_phase, run.entry_low = run.cycle, run.phase, run.phase_low
+    if model.age >= 0:
+        run.entry_phase, lost = sum_in_two_parts(run.phase, -run.y[model.age])
+        run.entry_low += lost
+
+
 @njit(**KERNEL)
 def wind(model, run):
     """Wind up the clocks of the mode that has just been entered.
 
     A tick of this instant is still ahead, unless the transition has fired at it or the run starts here. If
-    another mode was left at a tick of the same clock, that was its tick: two modes may take turns.
+    another mode was left at a tick of the same clock, that was its tick: two modes may take turns. From part
+    to part of a mode that has been split, a tick at the start fires as well: the run has begun in the part
+    that ends there.
     """
     mode, starts = run.mode, run.last_fired == NO_TRANSITION
     entered = starts or model.enters[run.last_fired] == 1
     moved = not starts and model.whole_mode[run.previous_mode] != model.whole_mode[mode]
     if entered:
-        run.entry_cycle, run.entry_phase, run.entry_low = run.cycle, run.phase, run.phase_low
+        keep_entry(model, run)
     for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
         transition = model.clocks[slot]
         own = model.tick_of[transition]
         if model.clock[transition] == AFTER:
             run.tick[own] = 0 if entered else run.tick[own]
             continue
-        run.tick[own] = max(run.tick[own], first_from(model, run, transition, starts))
+        ahead = starts and not leads_to_part(model, transition)
+        run.tick[own] = max(run.tick[own], first_from(model, run, transition, ahead))
         if moved:
             run.tick[own] = max(run.tick[own], run.ticked[model.clock_of[transition]])
 
@@ -146,16 +165,27 @@ def go_to_tick(model, run, transition):
 
 
 @njit(**KERNEL)
+def ticks_now(model, run, transition):
+    """Whether the next tick of a clock is at this instant."""
+    k = number_of_tick(model, run, transition)
+    return time_to_tick(model, run, transition, k) <= rounding_of_tick(model, run, transition, k)
+
+
+@njit(**KERNEL)
 def ticking(model, run, work):
-    """The first listed of the clocks that tick now and may fire; ticks that may not are passed over."""
-    mode = run.mode
-    for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
+    """The first listed of the clocks that tick now and may fire; ticks that may not are passed over.
+
+    Copies of one transition have one tick, which is not passed over if one of them may fire.
+    """
+    first, last, fires = model.first_clock[run.mode], model.first_clock[run.mode + 1], NO_TRANSITION
+    for slot in range(first, last):
         transition = model.clocks[slot]
-        k = number_of_tick(model, run, transition)
-        left = time_to_tick(model, run, transition, k)
-        if left > rounding_of_tick(model, run, transition, k):
-            continue
-        if allowed(model, transition, run.phase, run.y, work.scalar):
-            return transition
-        pass_tick(model, run, transition, False)
-    return NO_TRANSITION
+        if ticks_now(model, run, transition) and allowed(model, transition, run.phase, run.y, work.scalar):
+            last, fires = slot, transition
+            break
+    for slot in range(first, last):
+        transition = model.clocks[slot]
+        copy = fires != NO_TRANSITION and model.tick_of[transition] == model.tick_of[fires]
+        if not copy and ticks_now(model, run, transition):
+            pass_tick(model, run, transition, False)
+    return fires

@@ -204,7 +204,7 @@ def stays_on_guard(model, method, run, work):
             continue
         value = guard_value(model, transition, t, run.y, work.scalar)
         model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
-        if abs(value) <= error_band(method, run, work.gradient, model.dimension) and draws_state(
+        if abs(value) <= error_band(method, run, work.gradient, model.controlled) and draws_state(
             model, run, transition, mode, t, run.y, value, work
         ):
             return True

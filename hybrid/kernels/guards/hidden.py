@@ -59,7 +59,7 @@ def hidden_until(model, method, run, path, guard, end, work):
     if may_jump(model, run, transition, start, run.y, work):
         return 0.0, False
     model.guard_gradient(transition, start, run.y, model.parameters, work.gradient)
-    error = 0.0 if path.exact else error_band(method, run, work.gradient, model.dimension)
+    error = 0.0 if path.exact else error_band(method, run, work.gradient, model.controlled)
     rounding = rounding_band(model, run, transition, start, run.y, work)
     error, rounding = as_column(model, run, guard, error), as_column(model, run, guard, rounding)
     size = farthest_from_zero(model, path, guard, length, work)

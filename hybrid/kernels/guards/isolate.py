@@ -98,7 +98,7 @@ def _tolerated(model, method, run, path, guard, piece, work):
         # The program of a guard shows what rounding of the state does to it, a column does not.
         band = gradient_band(model, run, t, work.gradient)
     else:
-        band = error_band(method, run, work.gradient, model.dimension)
+        band = error_band(method, run, work.gradient, model.controlled)
     return as_column(model, run, guard, band)
 
 

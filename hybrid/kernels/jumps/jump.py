@@ -105,14 +105,21 @@ def saltation(model, transition, t, x_minus, x_plus, work):
 
 
 @njit(**KERNEL)
-def assume_sizes(n, work):
-    """Assume that the entries of ``work.saltation`` are made up of terms as large as its largest entry."""
+def largest_entry(model, work):
+    """The largest entry of ``work.saltation``, but for the rows and columns of counters."""
     largest = 0.0
-    for i in range(n):
-        for j in range(n):
+    for i in range(model.controlled):
+        for j in range(model.controlled):
             largest = max(largest, abs(work.saltation[i, j]))
-    for i in range(n):
-        for j in range(n):
+    return largest
+
+
+@njit(**KERNEL)
+def assume_sizes(model, work):
+    """Assume that the entries of ``work.saltation`` are made up of terms as large as its largest entry."""
+    largest = largest_entry(model, work)
+    for i in range(model.dimension):
+        for j in range(model.dimension):
             work.sizes[i, j] = largest
 
 
@@ -133,7 +140,7 @@ def carry_tangents(model, run, tangents, orthonormal, apart, work):
             work.reset_jacobian[i, j] = work.sizes[i, j]
     log_determinant, annihilated = log_abs_determinant(work.jacobian, work.reset_jacobian, n)
     run.log_determinant += log_determinant
-    run.strain += strain(work.saltation, n, log_determinant)
+    run.strain += strain(work.saltation, model.controlled, log_determinant)
     anew = orthonormal and (apart or not run.strain < STRAINED)
     if anew:
         run.indistinct += orthonormalise(run.y, n, tangents, run.growth, work.jacobian, False, 0)
@@ -170,7 +177,7 @@ def is_grazing(model, method, run, transition, transversality, work):
     branch point.
     """
     acceleration = guard_acceleration(model, run, transition, run.mode, run.phase, run.y, work)
-    band = error_band(method, run, work.gradient, model.dimension)
+    band = error_band(method, run, work.gradient, model.controlled)
     if transversality * transversality <= 2.0 * abs(acceleration) * band:
         return not finds_surface(model, transition, run.phase, run.y, transversality, work)
     # Inside such a dip the steps are as short as the dip, and so are the sizes that the tolerances refer to.
@@ -180,12 +187,9 @@ def is_grazing(model, method, run, transition, transversality, work):
 
 
 @njit(**KERNEL)
-def judge(run, n, work):
+def judge(model, run, work):
     """Store the largest entry of all saltation matrices so far, and count those that are not finite."""
-    largest = 0.0
-    for i in range(n):
-        for j in range(n):
-            largest = max(largest, abs(work.saltation[i, j]))
+    largest = largest_entry(model, work)
     run.largest_saltation = max(run.largest_saltation, largest)
     if not largest < math.inf:
         run.singular_jumps += 1
@@ -299,9 +303,9 @@ def jump(task, transition):
     remember_jump(run, record, transition, transversality, kind, known, work.new, work)
     if locked:
         map_of_instant(run, n, work.saltation)
-        assume_sizes(n, work)
+        assume_sizes(model, work)
     if tangents > 0:
-        judge(run, n, work)
+        judge(model, run, work)
         if locked:
             restore_tangents(run, n, tangents)
         grown = carry_tangents(model, run, tangents, task.orthonormal != 0, kind == GRAZING, work)
@@ -348,7 +352,7 @@ def rest(task):
     multiply(work.saltation, run.instant, n, n, work.state, work.rounding)
     if tangents > 0:
         map_of_instant(run, n, work.saltation)
-        assume_sizes(n, work)
+        assume_sizes(model, work)
         restore_tangents(run, n, tangents)
         apart = run.last_kind == GRAZING
         grown = carry_tangents(model, run, tangents, task.orthonormal != 0, apart, work)

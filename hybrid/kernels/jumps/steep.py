@@ -54,7 +54,7 @@ def is_lost(model, method, run, mode, transition, side, tangents, work):
         square = 0.0
         for i in range(start, start + n):
             square += run.y[i] * run.y[i]
-        floor = math.sqrt(square / n)
+        floor = math.sqrt(square / model.controlled)
         for i in range(start, start + n):
             grows = abs(work.new[i]) > GROWS * abs(work.trial[i])
             lost = abs(work.new[i]) * distance
@@ -90,7 +90,7 @@ def time_to_run_dry(model, method, run, transition, side, speed, work):
     A guard ``h`` that comes to rest as ``h' = -c h**q`` takes the time ``h / ((1 - q) c h**q)``. ``speed`` is
     that at the guard, and ``work.gradient`` its gradient there.
     """
-    t, level = run.phase, error_band(method, run, work.gradient, model.dimension)
+    t, level = run.phase, error_band(method, run, work.gradient, model.controlled)
     near = abs(speed_displaced(model, transition, run.mode, t, run.y, side * level, work))
     if not abs(speed) < SLOWS * near:
         return 0.0

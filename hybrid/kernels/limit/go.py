@@ -277,7 +277,7 @@ def go_to_limit(task, series, transition):
     forward(run, model.period, left)
     remember_jump(run, record, transition, 0.0, LIMIT_OF_CHATTER, True, work.settled, work)
     if tangents > 0:
-        assume_sizes(n, work)
+        assume_sizes(model, work)
         carry_tangents(model, run, tangents, task.orthonormal != 0, False, work)
     run.round = turn
     move(model, run, transition, target, work.settled)

@@ -108,7 +108,7 @@ def solve_stages(model, method, mode, t, h, y, work):
                 work.stages[stage, i] += change_of_stages[(stage - 1) * n + i]
         combine(y, h, method.a[s], work.stages, s + 1, n, work.new)
         square = 0.0
-        for i in range(n):
+        for i in range(model.controlled):
             size = max(abs(y[i]), abs(work.new[i]))
             for stage in range(1, s + 1):
                 # A component may begin and end at zero, as that of a flight from a guard back to it.
@@ -119,7 +119,7 @@ def solve_stages(model, method, mode, t, h, y, work):
                 for j in range(1, s + 1):
                     shift += method.a[stage, j] * change_of_stages[(j - 1) * n + i]
                 square += (h * shift / scale) ** 2
-        change = math.sqrt(square / (n * s))
+        change = math.sqrt(square / (model.controlled * s))
         if not abs(change) < math.inf:
             return False
         if change <= enough:
@@ -209,8 +209,8 @@ def attempt_radau(model, method, mode, t, h, y, tangents, work):
         return math.nan
     combine(y, h, method.quadrature, work.stages, s + 1, length, work.new)
     estimate_error(method, length, work)
-    between = error_ratio(method, h, y, n, 0, work)
+    between = error_ratio(model, method, h, y, 0, work)
     for start in range(0, length, n):
         substitute(estimate_filter, filter_pivots, n, work.error[start : start + n])
-    ratio = error_ratio(method, h, y, n, tangents, work)
+    ratio = error_ratio(model, method, h, y, tangents, work)
     return between if between > ratio else ratio

@@ -199,7 +199,7 @@ def stays_on_side(model, method, run, transition, path, work):
             return True
     if on_guard == BY_SPEED:
         degree = divide_by_theta(work.polynomial, degree)
-    error = error_band(method, run, work.gradient, model.dimension)
+    error = error_band(method, run, work.gradient, model.controlled)
     if on_guard < LATER and stays(work.polynomial, degree, run.side[transition], error):
         run.on_guard[transition] = 0
         return True

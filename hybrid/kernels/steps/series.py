@@ -228,7 +228,7 @@ def trusted(task, path, remaining):
     tolerance, polynomial = Tolerance(rtol, atol, path.exact), model.degree[mode] > 0
     if not polynomial:
         groups = whole_registers(tangents, NARROW) // NARROW
-        columns = Columns(n, model.tangent_start, model.tangent_columns[mode], groups)
+        columns = Columns(n, model.controlled, model.tangent_start, model.tangent_columns[mode], groups)
         h, last, growth = longest_step(series, columns, order, tolerance, work.weights)
         reach = power_of_two(MOST_BITS / order)
         if not 1.0 < h * reach < reach * reach:
@@ -239,7 +239,7 @@ def trusted(task, path, remaining):
     if clock < 0:
         h = min(h, method.max_step, remaining, as_far_as_last_time(model, run, mode))
         if not h < 1e100:
-            h = min(h, unhurried(series, n, run))
+            h = min(h, unhurried(series, model.controlled, run))
     else:
         h = min(h, 1e100)
     path = Path(series, order, clock, path.start, 1.0, h, path.exact)

@@ -253,7 +253,7 @@ def leading_of(model, method, run, guard, path, work):
         band = as_column(model, run, guard, rounding_band(model, run, transition, t, run.y, work))
         rests = guard.on_guard > 0 and size <= band
     if not path.exact:
-        band = as_column(model, run, guard, error_band(method, run, work.gradient, model.dimension))
+        band = as_column(model, run, guard, error_band(method, run, work.gradient, model.controlled))
     return Leading(transition, column, guard.side, guard.on_guard, known, size, power, band), rests
 
 

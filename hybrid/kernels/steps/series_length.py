@@ -54,11 +54,12 @@ FALL_OF_EXACT = 4.0
 class Columns(NamedTuple):
     """The columns of a series by which its step is controlled.
 
-    The first ``n`` are the state. The tangent vectors, four in a group, begin at ``first``, and their
-    ``groups`` are ``stride`` columns apart.
+    The first ``n`` are the state, of which ``controlled`` have tolerances. The tangent vectors, four in a
+    group, begin at ``first``, and their ``groups`` are ``stride`` columns apart.
     """
 
     n: INTEGER
+    controlled: INTEGER
     first: INTEGER
     stride: INTEGER
     groups: INTEGER
@@ -73,14 +74,14 @@ class Tolerance(NamedTuple):
 
 
 @njit(**INLINE)
-def weigh_state(series, n, tolerance, weights):
+def weigh_state(series, n, controlled, tolerance, weights):
     """One over the tolerance of each component of the state into ``weights``; all other weights are zero."""
     largest, (rtol, atol, exact) = 0.0, tolerance
-    for i in range(n if exact else 0):
+    for i in range(controlled if exact else 0):
         largest = max(largest, abs(series[0, i]))
     if exact and largest == 0.0:
         # At rest at the origin, the first terms determine the size.
-        for i in range(n):
+        for i in range(controlled):
             largest = max(largest, abs(series[1, i]), abs(series[2, i]), abs(series[3, i]))
     floor = SHARE * rtol * largest + TINY if exact else atol + TINY
     for i in range(0, n, NARROW):
@@ -90,15 +91,15 @@ def weigh_state(series, n, tolerance, weights):
 
 
 @njit(**INLINE)
-def weigh_tangents(series, n, first, tolerance, weights):
+def weigh_tangents(series, n, controlled, first, tolerance, weights):
     """One over the tolerance of every component of four tangent vectors, each measured against itself."""
     square, (rtol, _, exact) = four_times(0.0), tolerance
-    for i in range(n):
+    for i in range(controlled):
         component = load(series, 0, first + NARROW * i)
         square = component * component + square
     if not exact:
         rtol = min(rtol, max(TANGENT_SHARE * rtol, FINEST))
-    floor = (SHARE * rtol if exact else rtol) * square_root(square / n) + TINY
+    floor = (SHARE * rtol if exact else rtol) * square_root(square / controlled) + TINY
     for i in range(n):
         component = load(series, 0, first + NARROW * i)
         store(weights, 0, first + NARROW * i, 1.0 / (floor + rtol * magnitude(component)))
@@ -108,7 +109,7 @@ def weigh_tangents(series, n, first, tolerance, weights):
 def largest_term(series, columns, order, weights):
     """The largest terms of an order in tolerances, four at a time."""
     # A nan is skipped here; it shows when the series is summed.
-    worst, (n, first, stride, groups) = four_times(0.0), columns
+    worst, (n, _, first, stride, groups) = four_times(0.0), columns
     for i in range(0, n, NARROW):
         worst = larger(load(weights, 0, i) * magnitude(load(series, order, i)), worst)
     for g in range(groups):
@@ -156,9 +157,10 @@ def longest_step(series, columns, order, tolerance, weights):
     Returned with it are the logarithm of one over the step that the terms suggest, and by how much the newer
     of them are larger than the older ones, for ``is_regular``.
     """
-    weigh_state(series, columns.n, tolerance, weights)
-    for g in range(columns.groups):
-        weigh_tangents(series, columns.n, columns.first + g * columns.stride, tolerance, weights)
+    n, controlled, first, stride, groups = columns
+    weigh_state(series, n, controlled, tolerance, weights)
+    for g in range(groups):
+        weigh_tangents(series, n, controlled, first + g * stride, tolerance, weights)
     exact, fall = tolerance.exact, fall_per_order(tolerance, order)
     tail = order - (TAIL_OF_EXACT if exact else TAIL)
     newer = logarithms_of_terms(series, columns, order, tail, weights)
@@ -183,7 +185,7 @@ def is_regular(series, n, order, tolerance, last, growth, weights):
     tail = order - (TAIL_OF_EXACT if exact else TAIL)
     if tail <= 0:
         return last > -1000.0
-    fall, state = fall_per_order(tolerance, order), Columns(n, 0, 0, 0)
+    fall, state = fall_per_order(tolerance, order), Columns(n, n, 0, 0, 0)
     before, least = -math.inf, max(tail - BEFORE_TAIL, 0)
     for o in range(tail, least, -NARROW):
         earlier = logarithms_of_terms(series, state, o, least, weights)

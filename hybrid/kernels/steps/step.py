@@ -83,14 +83,14 @@ def estimate_error(method, length, work):
 
 
 @njit(**INLINE)
-def error_ratio(method, h, y, dimension, tangents, work):
+def error_ratio(model, method, h, y, tangents, work):
     """Largest ratio of estimated error to tolerance over the state and each tangent vector.
 
     A tangent vector has no absolute size, so its components are weighed against themselves and against the
     vector's root mean square. The two estimates are combined as in Hairer, Norsett and Wanner 1993, section
     II.10.
     """
-    n = dimension
+    n, controlled = model.dimension, model.controlled
     length = n * (1 + tangents)
     error, second_error, new = work.error, work.second_error, work.new
     worst = 0.0
@@ -98,18 +98,18 @@ def error_ratio(method, h, y, dimension, tangents, work):
         floor = method.atol
         if start > 0:
             square = 0.0
-            for i in range(start, start + n):
+            for i in range(start, start + controlled):
                 square += new[i] * new[i]
-            floor = method.rtol * math.sqrt(square / n) + 1e-300
+            floor = method.rtol * math.sqrt(square / controlled) + 1e-300
         first, second = 0.0, 0.0
-        for i in range(start, start + n):
+        for i in range(start, start + controlled):
             scale = floor + method.rtol * max(abs(y[i]), abs(new[i]))
             first += (error[i] / scale) ** 2
             second += (second_error[i] / scale) ** 2
         if not first < math.inf:
             return math.nan
         if first > 0.0:
-            worst = max(worst, h * first / math.sqrt((first + 0.01 * second) * n))
+            worst = max(worst, h * first / math.sqrt((first + 0.01 * second) * controlled))
     return worst
 
 
@@ -128,7 +128,7 @@ def attempt_explicit(model, method, mode, t, h, y, tangents, work):
     combine(y, h, method.b, work.stages, s, length, work.new)
     rates(model, mode, t + h, work.new, tangents, work.stages[s])
     estimate_error(method, length, work)
-    return error_ratio(method, h, y, model.dimension, tangents, work)
+    return error_ratio(model, method, h, y, tangents, work)
 
 
 @njit(**INLINE)
@@ -168,14 +168,15 @@ def starting_step(model, method, mode, t, y, tangents, remaining, work):
     no unit of the model matters. A state at rest has none, and the end of the run or the forcing period
     stands in. ``work.stages[0]`` holds the rates at ``(t, y)``; uses ``work.stages[1]`` as scratch.
     """
-    n = model.dimension
-    length = n * (1 + tangents)
+    n, length = model.dimension, model.dimension * (1 + tangents)
+    count = model.controlled * (1 + tangents)
     size, speed = 0.0, 0.0
-    for i in range(length):
-        scale = method.rtol * abs(y[i]) + (method.atol if i < n else method.rtol)
-        size += (y[i] / scale) ** 2
-        speed += (work.stages[0, i] / scale) ** 2
-    size, speed = math.sqrt(size / length), math.sqrt(speed / length)
+    for start in range(0, length, n):
+        for i in range(start, start + model.controlled):
+            scale = method.rtol * abs(y[i]) + (method.atol if i < n else method.rtol)
+            size += (y[i] / scale) ** 2
+            speed += (work.stages[0, i] / scale) ** 2
+    size, speed = math.sqrt(size / count), math.sqrt(speed / count)
     horizon = min(model.period, remaining) if model.period > 0.0 else remaining
     unit = max(size, MANY_TOLERANCES) / speed if speed > 0.0 else math.inf
     unit = min(unit, (1.0 if speed > 0.0 else AT_REST) * horizon)
@@ -187,7 +188,7 @@ def starting_step(model, method, mode, t, y, tangents, remaining, work):
     for i in range(length):
         scale = method.rtol * abs(y[i]) + (method.atol if i < n else method.rtol)
         bend += ((work.stages[1, i] - work.stages[0, i]) / scale) ** 2
-    bend = math.sqrt(bend / length) / h
+    bend = math.sqrt(bend / count) / h
     steepest = max(speed * unit, bend * unit * unit)
     if not steepest > 1e-15:
         return h

@@ -69,6 +69,8 @@ SPREAD = function(REAL, Programs, INTEGER, REAL, REAL, VECTOR, VECTOR, REAL, MAT
 class Model(Structure):
     """The functions of a compiled system, its parameters and its graph as index arrays.
 
+    Of the ``dimension`` components of the state the first ``controlled`` have tangent vectors and tolerances;
+    the others are counters, and exact. Component ``age`` is the time since the mode was entered; -1 for none.
     ``guard(i, ...)`` is the guard of transition ``i`` and ``guard(i + transitions, ...)`` its condition,
     which leaves ``out`` alone if there is none. ``outgoing[first_outgoing[m]:first_outgoing[m + 1]]`` are the
     transitions that leave mode ``m``, in the order they were listed, but for those that only a start fires:
@@ -120,6 +122,8 @@ class Model(Structure):
     series: SERIES_FUNCTION
     parameters: VECTOR
     dimension: INTEGER
+    controlled: INTEGER
+    age: INTEGER
     first_outgoing: INDICES
     outgoing: INDICES
     first_at_start: INDICES

@@ -23,6 +23,9 @@ def is_plain(model, run, beyond):
     for i in range(model.dimension):
         if run.trail[HELD, i] != 0.0:
             held += 1
+    for i in range(model.controlled, model.dimension):
+        if run.y[i] % 1.0 != 0.0:
+            return False
     for mode in range(model.bounded.shape[0]):
         if model.bounded[mode] == 0 and (mode == run.mode or run.stay[mode] > 0.0):
             return False

@@ -80,7 +80,7 @@ class Branch:
     Attributes
     ----------
     system, name
-        The model, and the name of the parameter.
+        The model, as in :class:`hybrid.PeriodicOrbit`, and the name of the parameter.
     parameter
         Values of the parameter, ``(N,)``.
     x0, mode

@@ -325,7 +325,8 @@ def _around(
         beyond = made[0].orbit
         yield *moment(beyond, j, share), beyond.loop.values, beyond.loop.period
     t, x = moment(place.orbit, j, share)
-    for shift in farther * np.vstack([np.eye(len(x)), -np.eye(len(x))]) * place.orbit.scale:
+    aside = np.eye(place.family.n, len(x)) * place.orbit.scale[:, None]
+    for shift in farther * np.vstack([aside, -aside]):
         yield t, x + shift, place.orbit.loop.values, place.orbit.loop.period
 
 

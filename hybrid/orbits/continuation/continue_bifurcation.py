@@ -16,9 +16,9 @@ from hybrid.orbits.continuation.branch import Bifurcation
 from hybrid.orbits.continuation.curve import SMOOTH, Curve, Special, Spot, along_curve
 from hybrid.orbits.continuation.measures import curve_measure_of
 from hybrid.orbits.continuation.place import Place, place_of, place_on
-from hybrid.orbits.continuation.result import Points, orbit_of
+from hybrid.orbits.continuation.result import Points, orbit_of, whole_orbit_of
 from hybrid.orbits.continuation.route import Loop
-from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.orbits.orbit import PeriodicOrbit, unaged
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.plan import check_solver
@@ -307,7 +307,7 @@ def _result(
 ) -> BifurcationCurve:
     points = Points(bifurcation.orbit.t0)
     spots = [item for item in items if isinstance(item, Spot)]
-    orbits = tuple(orbit_of(each.place.orbit, points) for each in spots)
+    orbits = tuple(unaged([whole_orbit_of(each.place.orbit, points) for each in spots]))
     special = tuple(
         CodimensionTwo(
             item.kind,
@@ -319,7 +319,7 @@ def _result(
         if isinstance(item, Special)
     )
     return BifurcationCurve(
-        system=bifurcation.orbit.system,
+        system=orbits[0].system,
         kind=bifurcation.kind,
         names=names,
         values=np.array([each.place.values for each in spots]),

@@ -11,14 +11,16 @@ from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
 from hybrid.orbits.continuation.crossing import crossing, flip_coefficient, fold_coefficient, is_supercritical
 from hybrid.orbits.continuation.place import Place, moment, place_on, share_of
-from hybrid.orbits.continuation.result import Points, mode_at, orbit_of
+from hybrid.orbits.continuation.result import Points, mode_at, whole_orbit_of
 from hybrid.orbits.continuation.walk import Event, walk
-from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.orbits.orbit import PeriodicOrbit, unaged
 from hybrid.orbits.sensitivity import is_isolated
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import Solver, Taylor
 from hybrid.status import SUCCESS, Status, StatusCode
+from hybrid.system.entries import has_age
+from hybrid.transform.aged import original_of
 
 Item = Place | Event
 
@@ -154,7 +156,7 @@ def branch_of(items: list[Item], points: Points) -> Branch:
     family = passes[0].family
     where = [points.at(each) for each in passes]
     stable = {id(place): is_stable(place) for place in places}
-    return Branch(
+    branch = Branch(
         system=family.system,
         name=family.names[0],
         parameter=np.array([place.value for place in places]),
@@ -169,8 +171,32 @@ def branch_of(items: list[Item], points: Points) -> Branch:
             if isinstance(item, Event)
         ),
         status=SUCCESS,
-        orbit=lambda i: orbit_of(passes[i], points),
+        orbit=lambda i: whole_orbit_of(passes[i], points),
     )
+    return _unaged(branch)
+
+
+def _unaged(branch: Branch) -> Branch:
+    """The branch without the age, if the age counts for nothing at all of its points."""
+    system, age = branch.system, branch.system.age
+    modes = {*branch.mode.tolist(), *(each.orbit.mode for each in branch.bifurcations)}
+    if age is None or any(has_age(system, mode) for mode in modes):
+        return branch
+    return attrs.evolve(
+        branch,
+        system=original_of(system),
+        x0=np.delete(branch.x0, age, axis=1),
+        multipliers=branch.multipliers[:, :-1],
+        bifurcations=tuple(_without_component(each, age) for each in branch.bifurcations),
+        orbit=lambda i: unaged([branch.orbit(i)])[0],
+    )
+
+
+def _without_component(bifurcation: Bifurcation, age: int) -> Bifurcation:
+    coefficient = bifurcation.coefficient
+    if isinstance(coefficient, np.ndarray):
+        coefficient = np.delete(coefficient, age)
+    return attrs.evolve(bifurcation, orbit=unaged([bifurcation.orbit])[0], coefficient=coefficient)
 
 
 def _sides(items: list[Item], i: int, stable: dict[int, bool]) -> tuple[bool | None, bool | None]:
@@ -198,10 +224,10 @@ def is_stable(place: Place) -> bool:
 def bifurcation_of(event: Event, stable: tuple[bool | None, bool | None], points: Points) -> Bifurcation:
     """An event as a result."""
     place = event.place if event.change is None else event.change.exact.place
-    orbit = orbit_of(place.orbit, points)
+    orbit = whole_orbit_of(place.orbit, points)
     if event.change is not None and not np.all(np.isfinite(orbit.fundamental)):
         # Where a guard loses its speed the derivatives have no bound: they are those of an orbit nearby.
-        near = orbit_of(event.change.exact.before.orbit, points)
+        near = whole_orbit_of(event.change.exact.before.orbit, points)
         orbit = attrs.evolve(
             orbit,
             multipliers=near.multipliers,

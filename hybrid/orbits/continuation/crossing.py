@@ -51,7 +51,14 @@ def _repeated(place: Place, times: int) -> Place | None:
         np.concatenate([loop.times[:1], *(loop.times[1:] + k * loop.period for k in range(times))]),
         loop.values,
     )
-    orbit = attrs.evolve(family, periods=times * family.periods, route=times * family.route).around(again)
+    route = tuple(
+        attrs.evolve(each, counters=tuple(np.add(each.counters, k * family.counted).tolist()))
+        for k in range(times)
+        for each in family.route
+    )
+    orbit = attrs.evolve(
+        family, periods=times * family.periods, route=route, counted=times * family.counted
+    ).around(again)
     if orbit is None:
         return None
     onward = np.concatenate(

@@ -37,7 +37,10 @@ class Family:
     """The orbits of a system over some of its parameters, along one route.
 
     ``periods`` is the number of forcing periods, 0 for an autonomous system. ``least`` are sizes ``(n,)`` of
-    the states, below which none is measured: an orbit may pass zero.
+    the states, below which none is measured: an orbit may pass zero. ``counted`` is by how much each counter
+    grows over the period.
+
+    The unknowns are states ``(n,)`` without counters, which the route has. A whole state has them behind.
     """
 
     system: HybridSystem
@@ -47,6 +50,21 @@ class Family:
     solver: Solver
     route: Route
     least: np.ndarray | float = 0.0
+    counted: np.ndarray | float = 0.0
+
+    @property
+    def n(self) -> int:
+        """Number of components of a state without counters."""
+        return self.system.tangent_dimension
+
+    def extended_state(self, x: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """The state of the extended system, from a whole state."""
+        return np.concatenate([x[: self.n], values, x[self.n :]])
+
+    def _without_counters(self, slopes: np.ndarray) -> np.ndarray:
+        """Derivatives ``(..., n + k + 1)`` in state, parameters and time, without the columns of counters."""
+        last = self.n + len(self.names)
+        return np.delete(slopes, np.s_[last : slopes.shape[-1] - 1], axis=-1)
 
     @property
     def forced(self) -> bool:
@@ -123,7 +141,7 @@ class Family:
                 for i, stretch in enumerate(self.route)
             )
             landings = tuple(
-                self._landing(stretch, flow.end, float(loop.times[i + 1]), loop.values)
+                self._landing(stretch, flow, float(loop.times[i + 1]), loop.values)
                 for i, (stretch, flow) in enumerate(zip(self.route, flows, strict=True))
             )
         except ArithmeticError:
@@ -161,8 +179,7 @@ class Family:
 
     def flow(self, stretch: Stretch, x: np.ndarray, begin: float, end: float, values: np.ndarray) -> Flow:
         """The motion of a stretch; ArithmeticError if it does not reach its end."""
-        n = len(x)
-        state = np.append(x, values)
+        n, state = len(x), self.extended_state(np.append(x, stretch.counters), values)
         mode = self.extended.mode_index(stretch.mode)
         last_mode = self.extended.mode_index(stretch.end_mode)
         first_rate = self._rate(mode, begin, state)
@@ -179,12 +196,15 @@ class Family:
             raise ArithmeticError
         return Flow(arc, *found)
 
-    def _landing(self, stretch: Stretch, x: np.ndarray, t: float, values: np.ndarray) -> Landing | None:
+    def _landing(self, stretch: Stretch, flow: Flow, t: float, values: np.ndarray) -> Landing | None:
         """The jumps at the end of a stretch."""
         if not stretch.fired:
             return None
         system, compiled, p = self.extended, self.compiled, self._others
-        n, state = len(x), np.append(x, values)
+        n, state = self.n, self.extended_state(np.append(flow.end, stretch.counters), values)
+        if flow.arc is not None:
+            # Jumps that accumulate within the stretch may have counted.
+            state = np.append(state[: n + len(values)], flow.arc.x[-1, n + len(values) :])
         whole = moved = np.eye(len(state), len(state) + 1)
         parts: list[tuple[np.ndarray, np.ndarray, np.ndarray | None]] = []
         height, first, own = 0.0, np.zeros(len(state) + 1), np.zeros(len(state) + 1)
@@ -199,17 +219,18 @@ class Family:
             elif abs(value) <= CLOSED * float(np.abs(gradient[:-1]) @ np.abs(state)):
                 # It is met by itself, by chance or by symmetry: the last jump did not set it off.
                 rate = self._rate(system.mode_index(transition.source), t, state)
-                parts.append((moved[:n], own, rate))
+                parts.append((self._without_counters(moved[:n]), self._without_counters(own), rate))
                 moved, own = np.eye(len(state), len(state) + 1), gradient
             reset = reset_function(transition, system.variables)
             if reset is not None:
                 slopes = compiled.derivative(reset, index, t, state, p)
                 state = compiled.value(reset, index, t, state, p)
                 whole, moved = (_after(slopes, each) for each in (whole, moved))
-        parts.append((moved[:n], own, None))
+        moved, own, whole, first = map(self._without_counters, (moved[:n], own, whole[:n], first))
+        parts.append((moved, own, None))
         if not (np.isfinite(height) and np.all(np.isfinite(first)) and np.all(np.isfinite(whole))):
             raise ArithmeticError
-        return Landing(state[:n], whole[:n], height, first, tuple(parts))
+        return Landing(state[:n], whole, height, first, tuple(parts))
 
     @cached_property
     def _others(self) -> np.ndarray:
@@ -223,13 +244,12 @@ class Family:
         return {name: value for name, value in given.items() if name not in self.names}
 
     def _rate(self, mode: int, t: float, state: np.ndarray) -> np.ndarray:
-        n = self.system.dimension
         function = field_function(self.extended.modes[mode], self.extended.variables)
-        return self.compiled.value(function, mode, t, state, self._others)[:n]
+        return self.compiled.value(function, mode, t, state, self._others)[: self.n]
 
     def rate(self, mode: str, t: float, x: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """The field ``(n,)`` of a mode."""
-        return self._rate(self.extended.mode_index(mode), t, np.append(x, values))
+        """The field ``(n,)`` of a mode at a whole state."""
+        return self._rate(self.extended.mode_index(mode), t, self.extended_state(x, values))
 
     def speed_terms(self, name: str, mode: str, t: float, x: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Terms ``(n + 1,)`` of a guard's speed along the field of a mode: of each state, and of time."""
@@ -245,14 +265,16 @@ class Family:
         """The guard of a transition."""
         index = self.extended.transition_index(name)
         function = guard_function(self.extended.transitions[index])
-        return float(self.compiled.value(function, index, t, np.append(x, values), self._others)[0])
+        state = self.extended_state(x, values)
+        return float(self.compiled.value(function, index, t, state, self._others)[0])
 
     def gradient(self, name: str, t: float, x: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Derivatives ``(n + 1,)`` of the guard of a transition in the state and the time."""
         index = self.extended.transition_index(name)
         function = guard_function(self.extended.transitions[index])
-        found = self.compiled.derivative(function, index, t, np.append(x, values), self._others)[0]
-        return np.delete(found, range(len(x), len(found) - 1))
+        state = self.extended_state(x, values)
+        found = self.compiled.derivative(function, index, t, state, self._others)[0]
+        return np.delete(found, np.s_[self.n : len(found) - 1])
 
     def _run(
         self, system: HybridSystem, mode: str, state: np.ndarray, span: tuple[float, float], tangents: bool
@@ -265,7 +287,7 @@ class Family:
                 mode=mode,
                 parameters=self.fixed,
                 solver=self.solver,
-                tangent=np.eye(len(state)) if tangents else None,
+                tangent=np.eye(system.tangent_dimension) if tangents else None,
             )
         except ArgumentError as error:
             raise ArithmeticError from error

@@ -65,13 +65,13 @@ def _touch_of(orbit: Pass, key: Key) -> _Touch | None:
         return None
     share = extremum(key, orbit)[0] % 1.0 if key.kind == "top" else 1.0
     t, x = moment(orbit, key.stretch, share)
-    n, state, fixed = len(x), np.append(x, values), system.parameter_values(family.fixed)
+    n, state, fixed = family.n, family.extended_state(x, values), system.parameter_values(family.fixed)
     rate = family.rate(transition.source, t, x, values)
     slopes = family.compiled.derivative(reset, index, t, state, fixed)[:n]
     after = family.compiled.value(reset, index, t, state, fixed)[:n]
     found = slopes[:, :n] @ rate + slopes[:, -1] - rate
     nothing = bool(np.all(np.abs(found) <= CONTINUOUS * np.abs(rate).max()))
-    moved = bool(np.any(np.abs(after - x) > CONTINUOUS * orbit.scale))
+    moved = bool(np.any(np.abs(after - x[:n]) > CONTINUOUS * orbit.scale))
     stays = transition.target == transition.source and not moved
     return _Touch(share, None if nothing else found, stays)
 

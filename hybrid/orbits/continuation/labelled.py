@@ -23,7 +23,7 @@ def dataset_of(branch: Any) -> xarray.Dataset:
     names = Names(branch.system.state_names, branch.system.units)
     found = branch.bifurcations
     orbits = [each.orbit for each in found]
-    n = branch.system.dimension
+    n, directions = branch.system.dimension, branch.multipliers.shape[1]
     variables: dict[str, Any] = {
         "x0": (("point", "state"), branch.x0, names.states),
         "mode": ("point", branch.mode.astype(str)),
@@ -48,7 +48,7 @@ def dataset_of(branch: Any) -> xarray.Dataset:
         "period_there": ("bifurcation", np.array([each.period for each in orbits], dtype=float)),
         "multipliers_there": (
             ("bifurcation", "multiplier"),
-            np.array([each.multipliers for each in orbits], dtype=complex).reshape(-1, n),
+            np.array([each.multipliers for each in orbits], dtype=complex).reshape(-1, directions),
         ),
     }
     coords = {branch.name: ("point", branch.parameter, names.of(branch.name)), **names.coords()}

@@ -115,13 +115,13 @@ def heights_of(orbit: Pass, i: int, transition: Transition, shares: np.ndarray) 
     loop, family, count = orbit.loop, orbit.family, len(orbit.flows)
     if orbit.flows[i].arc is None:
         return None
-    states = orbit.flows[i].at(shares)
+    states = orbit.whole(i, orbit.flows[i].at(shares))
     for outside, other, shift in (
         (shares < 0.0, (i - 1) % count, 1.0),
         (shares > 1.0, (i + 1) % count, -1.0),
     ):
         if np.any(outside):
-            states[outside] = orbit.flows[other].at(shares[outside] + shift)
+            states[outside, : family.n] = orbit.flows[other].at(shares[outside] + shift)
     begin, end = loop.times[i : i + 2]
     times = begin + shares * (end - begin)
     variables, values = family.system.variables, family.vector(loop.values)
@@ -196,12 +196,14 @@ def _speed(key: Key, orbit: Pass) -> float:
 
 def _rate(key: Key, orbit: Pass) -> float:
     loop, i = orbit.loop, key.stretch
-    rate = orbit.family.rate(key.name, float(loop.times[i + 1]), orbit.flows[i].end, loop.values)
+    end = orbit.whole(i, orbit.flows[i].end)
+    rate = orbit.family.rate(key.name, float(loop.times[i + 1]), end, loop.values)
     return orbit.speed(i, rate)
 
 
 def _when(key: Key, orbit: Pass) -> float:
-    t, x = float(orbit.loop.times[key.stretch + 1]), orbit.flows[key.stretch].end
+    i = key.stretch
+    t, x = float(orbit.loop.times[i + 1]), orbit.whole(i, orbit.flows[i].end)
     found = _condition(orbit, _transition(orbit, key), t, x)
     return np.nan if found is None else found
 

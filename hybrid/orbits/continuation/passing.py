@@ -93,7 +93,8 @@ class Pass:
 
         The size of an angle, which may count many turns, is its turn.
         """
-        sizes, turns = np.maximum(self.own_scale, self.family.least), self.family.system.turn_lengths
+        sizes = np.maximum(self.own_scale, self.family.least)
+        turns = self.family.system.turn_lengths[: len(sizes)]
         sizes = np.where(turns > 0.0, turns, sizes)
         return np.where(sizes > 0.0, sizes, 1.0)
 
@@ -125,6 +126,11 @@ class Pass:
     @property
     def _span(self) -> float:
         return abs(self.loop.period) or 1.0
+
+    def whole(self, i: int, x: np.ndarray) -> np.ndarray:
+        """States ``(..., n)`` in a stretch with the counters that it begins with."""
+        counters = np.array(self.family.route[i].counters)
+        return np.concatenate([x, np.broadcast_to(counters, (*x.shape[:-1], len(counters)))], axis=-1)
 
     @property
     def change(self) -> np.ndarray:
@@ -168,15 +174,15 @@ class Pass:
         Other orbits come to such a surface by a jump, which forgets how far they were from it.
         """
         family, loop, n = self.family, self.loop, self.loop.x.shape[1]
-        mode, t = family.route[0].mode, float(loop.times[0])
+        mode, t, x = family.route[0].mode, float(loop.times[0]), self.whole(0, loop.x[0])
         across = []
         for transition in family.system.transitions:
             if transition.target != mode or transition.source == mode:
                 continue
-            gradient = family.gradient(transition.name, t, loop.x[0], loop.values)[:n]
-            height = family.height(transition.name, t, loop.x[0], loop.values)
+            gradient = family.gradient(transition.name, t, x, loop.values)[:n]
+            height = family.height(transition.name, t, x, loop.values)
             near = abs(height) <= CLOSED * float(np.abs(gradient) @ self.scale)
-            if near and family.is_along(transition.name, mode, t, loop.x[0], loop.values):
+            if near and family.is_along(transition.name, mode, t, x, loop.values):
                 across.append(gradient)
         if not across:
             return np.eye(n)
@@ -250,7 +256,7 @@ class Pass:
                 matrix[first + i], values[first + i] = row, landing.height
             matrix[rows, after] -= np.eye(n)
             values[rows] = closed_change(
-                values[rows] - self.loop.x[(i + 1) % count], self.family.system.turn_lengths
+                values[rows] - self.loop.x[(i + 1) % count], self.family.system.turn_lengths[:n]
             )
         self._close(anchor, matrix[-1], values, first)
         matrix *= units

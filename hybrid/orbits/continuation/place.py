@@ -18,7 +18,7 @@ from hybrid.orbits.continuation.route import LARGEST_GROWTH, Loop, Stretch, rout
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver
-from hybrid.system.graph import refuse_counters
+from hybrid.transform.aged import aged, with_age
 
 # A step may turn by this angle (its cosine).
 LEAST_COSINE = 0.95
@@ -233,9 +233,12 @@ def place_on(orbit: Any, names: tuple[str, ...], sizes: np.ndarray, solver: Solv
     Raises
     ------
     ArgumentError
-        If the orbit is not found again, or its system has counters.
+        If the orbit is not found again.
     """
-    refuse_counters(orbit.system, "Continuation")
+    if orbit.transitions:
+        # Without a jump no mode is entered, and the age has no value to return to.
+        x0 = with_age(orbit.system, orbit.x0)
+        orbit = attrs.evolve(orbit, system=aged(orbit.system), x0=x0)
     family = Family(orbit.system, names, dict(orbit.parameters), orbit.forcing_periods, solver, ())
     arc, values = orbit.arc(solver), np.array([orbit.parameters[name] for name in names])
     started = start_of(family, arc, orbit.period, values) if arc.status.ok else None
@@ -251,7 +254,8 @@ def place_on(orbit: Any, names: tuple[str, ...], sizes: np.ndarray, solver: Solv
 def start_of(family: Family, arc: HybridArc, period: float, values: np.ndarray) -> tuple[Family, Loop] | None:
     """The family and the unknowns of the orbit that a run over one period shows; None if it has no value."""
     route, x, times = route_of(family.system, arc, period)
-    family = attrs.evolve(family, route=route)
+    counted = (arc.x[-1] - arc.x[0])[family.n :]
+    family = attrs.evolve(family, route=route, counted=counted)
     first = family.around(Loop(x, times, values))
     if first is None:
         return None
@@ -312,11 +316,11 @@ def share_of(orbit: Pass, t: float) -> tuple[int, float]:
 
 
 def moment(orbit: Pass, i: int, share: float) -> tuple[float, np.ndarray]:
-    """Time and state ``(n,)`` at a share of a stretch."""
+    """Time and whole state at a share of a stretch."""
     begin, end = orbit.loop.times[i : i + 2]
     if share == 0.0:
-        return float(begin), orbit.loop.x[i]
-    return float(begin + share * (end - begin)), orbit.flows[i].at(np.array([share]))[0]
+        return float(begin), orbit.whole(i, orbit.loop.x[i])
+    return float(begin + share * (end - begin)), orbit.whole(i, orbit.flows[i].at(np.array([share]))[0])
 
 
 def slides(orbit: Pass, i: int) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import moment, share_of
 from hybrid.orbits.continuation.route import Route
-from hybrid.orbits.orbit import PeriodicOrbit, turns_over
+from hybrid.orbits.orbit import PeriodicOrbit, turns_over, unaged
 from hybrid.status import SUCCESS
 
 
@@ -37,6 +37,12 @@ class Points:
 
 def orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
     """The orbit as a result, from the point that stands for it."""
+    [found] = unaged([whole_orbit_of(orbit, points)])
+    return found
+
+
+def whole_orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
+    """The orbit from the point that stands for it, with the age if the family has one."""
     family, loop = orbit.family, orbit.loop
     i, share = points.at(orbit)
     (t, x), mode = moment(orbit, i, share), mode_at(orbit, i, share)
@@ -82,11 +88,11 @@ def fundamental_at(orbit: Pass, i: int, share: float) -> np.ndarray:
     """The saltated fundamental matrix ``(n, n)`` over the period from a point within a stretch."""
     family, loop = orbit.family, orbit.loop
     (t, x), mode = moment(orbit, i, share), mode_at(orbit, i, share)
-    n, stretch, (begin, end) = len(x), family.route[i], loop.times[i : i + 2]
+    n, stretch, (begin, end) = family.n, family.route[i], loop.times[i : i + 2]
     before = attrs.evolve(stretch, end_mode=mode)
     after = attrs.evolve(stretch, mode=mode, within=stretch.within if mode == stretch.mode else ())
     first = family.flow(before, loop.x[i], float(begin), t, loop.values).slopes[:, :n]
-    last = family.flow(after, x, t, float(end), loop.values).slopes[:, :n]
+    last = family.flow(after, x[:n], t, float(end), loop.values).slopes[:, :n]
     matrix = orbit.saltations[i] @ last
     for each in [*orbit.maps[i + 1 :], *orbit.maps[:i]]:
         matrix = each @ matrix

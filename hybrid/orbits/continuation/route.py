@@ -29,12 +29,15 @@ class Stretch:
     fired
         Names of the transitions that fire at its end, at one instant, in order; empty if the next stretch
         goes on smoothly.
+    counters
+        Values of the counters at its start. They are no unknowns, and tell no routes apart.
     """
 
     mode: str
     end_mode: str
     within: tuple[str, ...]
     fired: tuple[str, ...]
+    counters: tuple[float, ...] = attrs.field(default=(), eq=False)
 
 
 Route = tuple[Stretch, ...]
@@ -80,10 +83,11 @@ def route_of(system: HybridSystem, arc: HybridArc, period: float) -> tuple[Route
 
     The first stretch begins after the first jump; without jumps it is the whole run.
     """
-    groups = instants(list(arc.jumps))
+    groups, n = instants(list(arc.jumps)), system.tangent_dimension
     if not groups:
-        mode = str(arc.mode[0])
-        return (Stretch(mode, mode, (), ()),), arc.x[:1].copy(), np.array([arc.t[0], arc.t[0] + period])
+        mode, x = str(arc.mode[0]), arc.x[:1, :n].copy()
+        stretch = Stretch(mode, mode, (), (), tuple(arc.x[0, n:].tolist()))
+        return (stretch,), x, np.array([arc.t[0], arc.t[0] + period])
     if any(group[0].kind == "limit" for group in groups):
         groups, within = _without_chatter(groups)
     else:
@@ -91,8 +95,9 @@ def route_of(system: HybridSystem, arc: HybridArc, period: float) -> tuple[Route
     stretches = []
     for group, after, passed in zip(groups, [*groups[1:], groups[0]], [*within[1:], within[0]], strict=True):
         names = tuple(jump.transition for jump in after)
-        stretches.append(Stretch(str(group[-1].target), after[0].source, passed, names))
-    x = np.array([group[-1].x_plus for group in groups])
+        counters = tuple(group[-1].x_plus[n:].tolist())
+        stretches.append(Stretch(str(group[-1].target), after[0].source, passed, names, counters))
+    x = np.array([group[-1].x_plus[:n] for group in groups])
     times = np.array([group[0].t for group in groups] + [groups[0][0].t + period])
     return tuple(stretches), x, times
 

@@ -20,6 +20,7 @@ from hybrid.solvers import Taylor
 from hybrid.status import SUCCESS, Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.periodicity import closed_change
+from hybrid.transform.aged import aged
 
 if TYPE_CHECKING:
     import xarray
@@ -64,6 +65,9 @@ def open_branch(system: HybridSystem, saved: xarray.Dataset | str | Path) -> Bra
             saved = xarray.open_zarr(saved).load()
     if not isinstance(saved, xarray.Dataset) or saved.attrs.get("kind") != KIND:
         raise arguments.refusal("saved", "be the dataset of a branch, or a folder where it is", saved)
+    if len(saved.state) > system.dimension:
+        # Points of the branch lie in modes where the time since the entry counts.
+        system = aged(system)
     if tuple(map(str, saved.state.values)) != system.state_names:
         raise ArgumentError(
             f"saved is a branch of a system with the states {', '.join(map(str, saved.state.values))}; got a "
@@ -126,6 +130,7 @@ def _orbit(
         tangent=True,
     )
     assert arc.fundamental is not None
+    change = (arc.x[-1] - x0)[: system.tangent_dimension]
     with np.errstate(divide="ignore"):
         moduli = np.log(np.abs(multipliers))
     return PeriodicOrbit(
@@ -138,10 +143,10 @@ def _orbit(
         multipliers=multipliers.real if np.all(multipliers.imag == 0.0) else multipliers,
         log_moduli=moduli,
         fundamental=arc.fundamental,
-        residual=float(np.linalg.norm(closed_change(arc.x[-1] - x0, system.turn_lengths))),
+        residual=float(np.linalg.norm(closed_change(change, system.turn_lengths[: len(change)]))),
         iterations=0,
         signature=(mode, *(str(jump.target) for jump in arc.jumps)),
         transitions=tuple(map(str, arc.jumps.transition)),
         status=SUCCESS,
-        turns=turns_over(system, arc.x[-1] - x0),
+        turns=turns_over(system, change),
     )

@@ -12,6 +12,9 @@ import numpy as np
 from hybrid.display.tables import counted, html_table
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.status import Status
+from hybrid.system.entries import has_age
+from hybrid.system.graph import HybridSystem
+from hybrid.transform.aged import original_of
 
 if TYPE_CHECKING:
     import xarray
@@ -122,6 +125,7 @@ class Attractors(Mapping[int, Attractor]):
         import xarray
 
         n, found = len(self.names.state), self._found
+        directions = len(found[0].exponents) if found else n
         most = max((len(each.points) for each in found), default=0)
         points, modes = np.full((len(found), most, n), np.nan), np.full((len(found), most), "", dtype=object)
         for i, each in enumerate(found):
@@ -132,15 +136,41 @@ class Attractors(Mapping[int, Attractor]):
             "round": ("attractor", np.array([each.round for each in found], dtype=np.int64)),
             "period": ("attractor", np.array([each.period for each in found]), self.names.of("t")),
             "jumps": ("attractor", np.array([each.jumps for each in found])),
-            "exponents": (("attractor", "exponent"), _rows(found, "exponents", n), self.names.rate),
-            "standard_error": (("attractor", "exponent"), _rows(found, "standard_error", n), self.names.rate),
+            "exponents": (("attractor", "exponent"), _rows(found, "exponents", directions), self.names.rate),
+            "standard_error": (
+                ("attractor", "exponent"),
+                _rows(found, "standard_error", directions),
+                self.names.rate,
+            ),
             "points": (axes, points, self.names.states),
             "mode_of_point": (axes[:2], modes),
         }
-        coords = {"attractor": np.arange(1, len(found) + 1), "exponent": np.arange(1, n + 1)}
+        coords = {"attractor": np.arange(1, len(found) + 1), "exponent": np.arange(1, directions + 1)}
         return xarray.Dataset(
             variables, {**coords, **self.names.coords()}, attributes("attractors", self.status)
         )
+
+
+def unaged(found: tuple[Attractor, ...], system: HybridSystem) -> tuple[tuple[Attractor, ...], HybridSystem]:
+    """Attractors of a system without the age, if the age counts for nothing at all of their points.
+
+    It then has no part in their states, and the exponent minus infinity. Returned with the system.
+    """
+    age = system.age
+    modes = {str(mode) for each in found for mode in each.mode}
+    if age is None or any(has_age(system, mode) for mode in modes):
+        return found, system
+    shown = (
+        attrs.evolve(
+            each,
+            points=np.delete(each.points, age, axis=1),
+            exponents=each.exponents[:-1],
+            standard_error=each.standard_error[:-1],
+            start=np.delete(each.start, age),
+        )
+        for each in found
+    )
+    return tuple(shown), original_of(system)
 
 
 def _rows(found: tuple[Attractor, ...], name: str, n: int) -> np.ndarray:

@@ -14,7 +14,7 @@ from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.labelled import Names
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
-from hybrid.sweep.attractors.attractor import Attractors
+from hybrid.sweep.attractors.attractor import Attractors, unaged
 from hybrid.sweep.attractors.runs import CODE, OWNER
 from hybrid.sweep.attractors.search import Search
 from hybrid.sweep.attractors.setup import setup_of
@@ -23,6 +23,7 @@ from hybrid.sweep.local import cores
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem
 from hybrid.system.growth import growing
+from hybrid.transform.aged import with_age
 
 
 @growing
@@ -62,6 +63,7 @@ def attractors(
         As for :func:`hybrid.simulate`.
     over
         For each component of the state a number, a range ``(low, high)``, or an array of values to draw from.
+        Held components and counters may be left out: they are 0 then.
     t0
         Time at the starts; its phase is that of the section of a forced system.
     section
@@ -110,7 +112,7 @@ def attractors(
     """
     axes = axes_of(system, over)
     count = arguments.count("starts", starts, 1)
-    origins = sample_of(system, axes, count, arguments.count("seed", seed, 0))
+    origins = with_age(system, sample_of(system, axes, count, arguments.count("seed", seed, 0)))
     threads = cores() if executor is None else arguments.count("executor", executor, 1)
     given = {
         "mode": mode,
@@ -129,9 +131,9 @@ def attractors(
         search.pilot(origins)
         rows = search.decided(origins, bar)
         stopped = CTRL_C.is_set()
-    found, _ = search.ordered()
+    found, shown = unaged(search.ordered()[0], setup.system)
     status = interrupted_status("the attractors found so far") if stopped else status_of_search(rows, periods)
-    return Attractors(found, status, Names(system.state_names, dict(system.units)))
+    return Attractors(found, status, Names(shown.state_names, dict(shown.units)))
 
 
 def as_flag(progress: object) -> bool | None:

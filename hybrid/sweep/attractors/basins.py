@@ -16,7 +16,7 @@ from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.labelled import Names
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
-from hybrid.sweep.attractors.attractor import Attractors
+from hybrid.sweep.attractors.attractor import Attractors, unaged
 from hybrid.sweep.attractors.attractors import as_flag, status_of_search
 from hybrid.sweep.attractors.find import Found
 from hybrid.sweep.attractors.runs import CODE, NONE, OWNER, POINTS, runs_of
@@ -29,6 +29,7 @@ from hybrid.sweep.sweep import sweep
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, starting_mode
 from hybrid.system.growth import growing
+from hybrid.transform.aged import original_of, with_age
 
 if TYPE_CHECKING:
     import xarray
@@ -70,7 +71,8 @@ def basins(
         As for :func:`hybrid.attractors`.
     over
         For each component of the state a number, which all starts have; an array of values; or a range
-        ``(low, high)``, of which 100 values are taken. Each array or range is an axis of the grid.
+        ``(low, high)``, of which 100 values are taken. Each array or range is an axis of the grid. Held
+        components and counters may be left out: they are 0 then.
     store, executor, progress
         As for :func:`hybrid.sweep`: the points of the sweep are the lines of the grid along its first axis.
         Lines that a store holds are not run again.
@@ -102,6 +104,7 @@ def basins(
     axes = axes_of(system, over, RESERVED)
     shown = as_flag(progress)
     grid = grid_of(system, axes)
+    grid = attrs.evolve(grid, origins=with_age(system, grid.origins))
     given = {
         "mode": mode,
         "parameters": parameters,
@@ -183,7 +186,7 @@ class Lines:
     @property
     def system(self) -> HybridSystem:
         """The model."""
-        return self.setup.system
+        return original_of(self.setup.system)
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -205,7 +208,8 @@ def _dataset(setup: Setup, grid: Grid, search: Search, rows: np.ndarray, status:
     violated = list(system.mode_names) if named is None else [named]
     code = np.where(rows[:, CODE] == codes.REFUSED, StatusCode.FAILED, rows[:, CODE])
     code = np.where(rows[:, CODE] == codes.MAX_STEPS, StatusCode.NOT_CONVERGED, code)
-    names = Names(system.state_names, dict(system.units))
+    found, shown = unaged(found, system)
+    names = Names(shown.state_names, dict(shown.units))
     made = Attractors(found, status, names).to_xarray()
     told = {"0": "no attractor", "-1": f"violates {', '.join(violated)}"}
     made["label"] = (dims, label.reshape(shape), {f"meaning of {key}": text for key, text in told.items()})

@@ -70,7 +70,7 @@ def find(setup: Setup, x0: np.ndarray, mode: str | None) -> Found | None:
     before, _ = _collected(points, setup.periods)
     if points.code != codes.DONE:
         return None
-    turns = setup.system.turn_lengths
+    turns = setup.turns
     extent, share = _extent(np.vstack([x0, before]), turns), math.sqrt(setup.solver.rtol)
     sample = np.empty((0, len(x0))), np.empty((0, 2), dtype=np.int64)
     # Chaos may be a long transient of a periodic orbit, so it takes many points to call an attractor chaotic.
@@ -88,7 +88,7 @@ def find(setup: Setup, x0: np.ndarray, mode: str | None) -> Found | None:
 
 def _collected(points: Points, count: int) -> tuple[np.ndarray, np.ndarray]:
     states, places = points.more(count)
-    states = within_turns(states, points.trajectory.system.turn_lengths)
+    states = within_turns(states, points.runs.setup.turns)
     if points.code != codes.DONE:
         # A run that needs a mode which has not been made yet is repeated.
         status_of(points.trajectory, points.code)
@@ -140,13 +140,13 @@ def _periodic(setup: Setup, points: Points, count: int, extent: np.ndarray, x0: 
         return None
     period = count * setup.interval if setup.forced else run.t - begin
     jumps = run.jumps - jumps - (count if setup.markers else 0)
-    error = np.full(len(origin), setup.solver.rtol * (run.steps - steps) / period)
     moved = _orbit(setup, origin, mode, period)
     rests = jumps == 0 and bool(np.all(moved <= math.sqrt(setup.solver.rtol) * extent))
     log_moduli = _log_moduli(setup, origin, mode, period)
     if np.any(log_moduli > math.sqrt(setup.solver.rtol)):
         # The run has come to rest on the stable manifold of an unstable orbit.
         return None
+    error = np.full(len(log_moduli), setup.solver.rtol * (run.steps - steps) / period)
     size = np.where(moved > math.sqrt(setup.solver.rtol) * extent, moved, extent)
     attractor = Attractor(
         kind="equilibrium" if rests else "periodic",
@@ -161,7 +161,7 @@ def _periodic(setup: Setup, points: Points, count: int, extent: np.ndarray, x0: 
     )
     if rests:
         attractor = attrs.evolve(attractor, points=states[-1:], mode=attractor.mode[-1:], round=1)
-    return Found(attractor, setup.tolerance * size, setup.system.turn_lengths)
+    return Found(attractor, setup.tolerance * size, setup.turns)
 
 
 def _orbit(setup: Setup, x: np.ndarray, mode: str, time: float) -> np.ndarray:
@@ -169,14 +169,14 @@ def _orbit(setup: Setup, x: np.ndarray, mode: str, time: float) -> np.ndarray:
     span = (setup.t0, setup.t0 + time)
     arc = simulate(setup.system, x, span, mode=mode, parameters=setup.parameters, solver=setup.solver)
     states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], 64 * LOOKED_AT))])
-    turns = setup.system.turn_lengths
+    turns = setup.turns
     moved = np.ptp(states, axis=0)
     return np.asarray(np.where(turns > 0.0, np.minimum(moved, turns), moved))
 
 
 def _log_moduli(setup: Setup, x: np.ndarray, mode: str, period: float) -> np.ndarray:
     """Logarithms of the moduli of the multipliers ``(n,)``; nan if they cannot be computed."""
-    n = len(x)
+    n = setup.system.tangent_dimension
     try:
         trajectory = setup.begin(x, mode, tangent=np.eye(n))
         factors = fundamental_factors(trajectory, trajectory.t + period, np.ones(n))
@@ -214,7 +214,7 @@ def _wandering(
         start=x0,
     )
     radius = setup.tolerance * np.where(moved > 0, moved, extent)
-    whole = Found(attractor, radius, setup.system.turn_lengths)
+    whole = Found(attractor, radius, setup.turns)
     if attractor.kind == "periodic":
         whole = attrs.evolve(whole, attractor=_closed(setup, attractor, origin, mode))
     return _thinned(whole, more, names[more_places[:, 0]])
@@ -225,7 +225,7 @@ def _closed(setup: Setup, attractor: Attractor, x: np.ndarray, mode: str) -> Att
 
     Points at equal times do not come back. The plane lies through a point, across the speed there.
     """
-    turns = setup.system.turn_lengths
+    turns = setup.turns
     extent = np.maximum(_extent(attractor.points, turns), np.finfo(float).tiny)
     normal = (setup.begin(x, mode).field() / extent / extent).tolist()
     place = list(enumerate(zip(normal, x.tolist(), turns.tolist(), strict=True)))
@@ -279,7 +279,7 @@ def _exponents(setup: Setup, x: np.ndarray, mode: str, pace: float) -> tuple[np.
 
     They are averaged for longer while more of them cannot be told from zero than must be zero.
     """
-    n = len(x)
+    n = setup.system.tangent_dimension
     try:
         trajectory = setup.begin(x, mode, tangent=np.eye(n))
     except HybridError:
@@ -302,7 +302,8 @@ def _exponents(setup: Setup, x: np.ndarray, mode: str, pace: float) -> tuple[np.
 
 def _kind(exponents: np.ndarray, error: np.ndarray, *, forced: bool) -> str:
     """The kind of motion by the signs of its exponents; without forcing one of them is that of the flow."""
-    if np.isnan(exponents).any() or np.isnan(error).any():
+    # The error of a direction that jumps annihilate, whose exponent is minus infinity, is not known.
+    if np.isnan(exponents).any() or np.isnan(error[np.isfinite(exponents)]).any():
         return UNKNOWN
     zero = np.abs(exponents) <= 2 * error
     if np.any((exponents > 0) & ~zero):

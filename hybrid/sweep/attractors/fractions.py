@@ -28,6 +28,7 @@ from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem
 from hybrid.system.growth import growing
 from hybrid.system.labels import named
+from hybrid.transform.aged import original_of, with_age
 
 if TYPE_CHECKING:
     import xarray
@@ -72,6 +73,7 @@ def basin_fractions(
         As for :func:`hybrid.attractors`.
     over
         For each component of the state a number, a range ``(low, high)``, or an array of values to draw from.
+        Held components and counters may be left out: they are 0 then.
     along
         None, or one parameter with its values in order, ``{"w": values}``.
     starts, seed
@@ -103,7 +105,7 @@ def basin_fractions(
     """
     axes = axes_of(system, over)
     count = arguments.count("starts", starts, 1)
-    origins = sample_of(system, axes, count, arguments.count("seed", seed, 0))
+    origins = with_age(system, sample_of(system, axes, count, arguments.count("seed", seed, 0)))
     name, values = _along(system, along, parameters)
     given = {
         "mode": mode,
@@ -194,7 +196,7 @@ class FractionsAt:
     @property
     def system(self) -> HybridSystem:
         """The model."""
-        return self.setup.system
+        return original_of(self.setup.system)
 
     @property
     def facts(self) -> dict[str, Any]:

@@ -133,7 +133,7 @@ def known_of(setup: Setup, found: list[Found]) -> Any:
     mode = np.array([index[name] for each in found for name in each.attractor.mode.tolist()], dtype=np.int64)
     radius = np.array([each.radius for each in found])
     # Points are not in order along a circle: if all components are angles, every point is looked at.
-    turns = setup.system.turn_lengths
+    turns = setup.turns
     spread = np.where(turns > 0.0, -1.0, np.ptp(points, axis=0) / radius.max(axis=0))
     axis = int(np.argmax(spread))
     order = np.argsort(points[:, axis], kind="stable")

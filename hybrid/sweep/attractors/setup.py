@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cached_property
 from hashlib import blake2b
 from typing import Any
 
@@ -19,8 +20,9 @@ from hybrid.simulation.plan import check_solver
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.elements import Guard
-from hybrid.system.graph import HybridSystem, as_system, check_mode, refuse_counters
+from hybrid.system.graph import HybridSystem, as_system, check_mode
 from hybrid.system.labels import named
+from hybrid.transform.aged import aged, original_of
 from hybrid.transform.markers import with_section
 
 
@@ -62,6 +64,16 @@ class Setup:
         """How many of the first transitions mark the section."""
         return 0 if self.section is None else len(self.system.modes)
 
+    @cached_property
+    def turns(self) -> np.ndarray:
+        """Lengths of a turn ``(n,)``, 0 for components that are no angle.
+
+        That of a counter is 1: two states that differ by a counter are the same place.
+        """
+        system = self.system
+        counts = np.arange(system.dimension) >= system.tangent_dimension
+        return np.where(counts, 1.0, system.turn_lengths)
+
     @property
     def forced(self) -> bool:
         """Whether points are taken once per forcing period."""
@@ -85,7 +97,7 @@ class Setup:
         """What decides the results, by name."""
         own = ("mode", "t0", "solver", "section", "interval", "periods", "recurrences", "tolerance")
         return {
-            "model": self.system,
+            "model": original_of(self.system),
             **{name: getattr(self, name) for name in own},
             **{f"parameter_{name}": value for name, value in self.parameters.items()},
         }
@@ -99,11 +111,12 @@ def digest(array: np.ndarray) -> str:
 def setup_of(system: HybridSystem, first: np.ndarray, given: Mapping[str, Any]) -> Setup:
     """The setup of a search with every argument checked.
 
-    ``first`` is a start that shows the time scale; ``given`` has the arguments of :func:`hybrid.attractors`
-    that are fields of a setup.
+    The system is the aged one: where a mode is left at a time after its entry, that time is a part of the
+    state. ``first`` is a start that shows the time scale; ``given`` has the arguments of
+    :func:`hybrid.attractors` that are fields of a setup.
     """
     as_system("system", system)
-    refuse_counters(system, "The search for attractors")
+    system = aged(system)
     overrides = named("parameters", given["parameters"])
     system.parameter_values(overrides)
     mode, section, interval = given["mode"], given["section"], given["interval"]

@@ -75,7 +75,8 @@ def axes_of(system: HybridSystem, over: object, reserved: tuple[str, ...] = ()) 
         name = plain_name(key) if isinstance(key, str) else key
         name = arguments.known("over: State component", name, names, "State components")
         found.append(_axis(name, key, value))
-    missing = [name for name in names if name not in {each.name for each in found}]
+    named, moving = {each.name for each in found}, system.variables.moving
+    missing = [name for name in names[:moving] if name not in named]
     if missing:
         raise ArgumentError(
             f"over must name every component of the state; it lacks {', '.join(missing)}. "
@@ -86,7 +87,8 @@ def axes_of(system: HybridSystem, over: object, reserved: tuple[str, ...] = ()) 
             raise ArgumentError(
                 f"over: {each.name!r} is also the name of a result. Rename the state of the model."
             )
-    return found
+    still = (name for name in names[moving:] if name not in named)
+    return [*found, *(Axis(name, np.array(0.0), False, {}) for name in still)]
 
 
 def _axis(name: str, key: object, value: object) -> Axis:

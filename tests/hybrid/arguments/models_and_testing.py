@@ -1,5 +1,7 @@
 """Models, contact laws and tests of systems: valid calls, and what each argument must refuse."""
 
+import math
+
 import hybrid
 import hybrid.testing
 import models
@@ -13,6 +15,7 @@ from tests.hybrid.arguments.values import (
     NOT_NEGATIVE,
     NUMBER,
     POSITIVE,
+    QUANTITY,
     RANGES,
     SOLVER,
     SPAN,
@@ -81,6 +84,7 @@ def checks():
 
 def laws():
     return [
+        (call(models.dosing_schedule), {"times": [*QUANTITY[:-2], [], [2.0, 1.0], [math.nan]]}),
         (call(models.vibroimpact), {"contact": ["a", 3, 0, False, contact.Rigid, Odd()]}),
         (
             call(contact.hertz_stiffness),

@@ -116,6 +116,7 @@ def systems():
                 "counters": MEMORY,
                 "modes": [*LIST, [], [1], ["a"]],
                 "transitions": [*LIST, [1], ["a"]],
+                "listed_order": FLAG,
                 "start": NAME,
                 "period": [*LIMIT[1:], math.inf],
                 "name": TEXT,

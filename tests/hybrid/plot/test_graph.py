@@ -8,8 +8,8 @@ mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
-from hybrid.plot import plot_graph
+from hybrid import After, At, Every, Guard, HybridSystem, Mode, Reset, Transition, simulate
+from hybrid.plot import plot_graph, plot_jumps
 from hybrid.plot.graph import FAN, SIZES
 from hybrid.plot.style import COLOURS
 
@@ -212,3 +212,26 @@ def test_boxes_have_the_colours_of_their_modes():
     for k, name in enumerate("abc"):
         [box] = [text.get_bbox_patch() for text in ax.texts if text.get_text() == name]
         assert mpl.colors.to_hex(box.get_edgecolor()).upper() == COLOURS[k]
+
+
+def test_the_label_of_a_clock_says_when_it_ticks():
+    def row(a, b, guard, name):
+        return Transition(a, b, guard, name=name)
+
+    clocked = HybridSystem(
+        state=("q",),
+        parameters={"T": 0.5, "rest": 0.2},
+        modes=[Mode(name, lambda t, x, p: (1.0,)) for name in "abc"],
+        transitions=[
+            row("a", "b", Every("T"), "tick"),
+            row("b", "c", After("rest"), "recover"),
+            row("c", "a", At([1.0, 2.0]), "listed"),
+        ],
+    )
+    ax = plot_graph(clocked)
+    texts = {text.get_text() for text in ax.texts}
+    assert {"tick (every T)", "recover (after rest)", "listed (at 2 times)"} <= texts
+    assert not any("guard" in text for text in texts)
+    arc = simulate(clocked, (0.0,), (0.0, 3.0), mode="a")
+    rows = plot_jumps(arc.jumps)
+    assert [label.get_text() for label in rows.get_yticklabels()][:1] == ["tick (every T)"]

@@ -4,6 +4,7 @@ import math
 import pickle
 from fractions import Fraction
 
+import attrs
 import numpy as np
 import pytest
 
@@ -168,6 +169,21 @@ def test_a_sample_is_taken_in_the_mode_that_a_slower_clock_enters():
         assert len(arc.jumps) == 24
 
 
+def test_a_reset_that_may_land_in_several_parts_misses_no_tick():
+    """Each part is a copy of the transition with a condition; the copies share their ticks."""
+    kicked = Transition("m", "m", Every(1.0), Reset(lambda t, x, p: {"v": x.v + 1.0, "n": x.n + 1}))
+    pieces = hybrid.split(
+        HybridSystem(
+            state=("v",),
+            counters=("n",),
+            modes=[Mode("m", lambda t, x, p: (-0.5 * np.sign(x.v),))],
+            transitions=[kicked],
+        )
+    )
+    for start in (-20.3, -2.3, -0.3, 0.3):
+        assert hybrid.simulate(pieces, {"v": start}, (0.0, 12.5))["n"][-1] == 12.0
+
+
 def test_clocks_in_a_system_that_is_split():
     """Crossing a kink neither enters the mode anew nor makes a clock tick twice."""
     field = Mode("m", lambda t, x, p: (np.cos(t) + 0.1 * np.abs(x.q), 0.0))
@@ -297,9 +313,34 @@ def test_a_marker_does_not_enter_a_mode():
     assert arc.jumps.t == pytest.approx([0.3, 0.4])
 
 
-def test_tangent_vectors_refuse_after():
-    with pytest.raises(ArgumentError, match="tangent vectors do not know when its mode was entered"):
-        hybrid.simulate(neuron(), (0.0,), (0.0, 1.0), tangent=True)
+@pytest.mark.parametrize("backwards", [False, True])
+def test_copies_of_a_clock_have_one_tick(backwards):
+    """A mode that has been split is left to the part in which the state lies, whichever copy comes first."""
+    system = hybrid.split(
+        HybridSystem(
+            state=("v", "spikes"),
+            modes=[
+                Mode("rise", lambda t, x, p: (1.5 - x.v + 0.5 * np.maximum(x.v - 0.5, 0.0), 0.0)),
+                Mode("rest", lambda t, x, p: (0.0, 0.0)),
+            ],
+            transitions=[
+                Transition(
+                    "rise", "rest", Guard(lambda t, x, p: x.v - 1, 1), Reset(loop_reset), name="spike"
+                ),
+                Transition("rest", "rise", After(0.7), name="again"),
+            ],
+            start="rise",
+        )
+    )
+    order = system.transitions[::-1] if backwards else system.transitions
+    arc = hybrid.simulate(attrs.evolve(system, transitions=order), (0.0, 0.0), (0.0, 20.0))
+    assert {jump.target for jump in arc.jumps["again"]} == {"rise: v<0.5", "rise: v>0.5"}
+    assert arc["spikes"][-1] == len(arc.jumps["spike"]) > 20
+
+
+def loop_reset(t, x, p):
+    """Low and high by turns."""
+    return {"v": 0.8 * (x.spikes % 2), "spikes": x.spikes + 1}
 
 
 def test_multipliers_of_a_switched_coil():

@@ -214,3 +214,18 @@ def test_without_sensitivities_there_are_none():
     with_them = simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.0), sensitivities=("e",))
     with pytest.raises(ArgumentError, match="Run simulate with samples="):
         _ = with_them.sampled_sensitivity
+
+
+DRIVE = 1.5
+
+
+def test_a_global_that_has_changed_is_read_anew(monkeypatch):
+    """As by the run itself: the derivatives are those of the function as it is now."""
+    system = HybridSystem(
+        state=("v",), parameters={"k": 1.0}, modes=[Mode("run", lambda t, x, p: (DRIVE - p.k * x.v,))]
+    )
+    for drive in (1.5, 2.0):
+        monkeypatch.setattr(f"{__name__}.DRIVE", drive)
+        arc = simulate(system, (0.0,), (0.0, 3.0), sensitivities=("k",))
+        exact = drive * (4.0 * np.exp(-3.0) - 1.0)
+        np.testing.assert_allclose(arc.sensitivity, [[exact]], rtol=1e-9)

@@ -14,8 +14,6 @@ from hybrid import (
     ModelError,
     Reset,
     Transition,
-    attractors,
-    continue_orbit,
     periodic_orbit,
     saltation_matrix,
     simulate,
@@ -326,22 +324,6 @@ def test_split_keeps_what_is_held():
     assert arc.status.ok
     assert arc["n"][-1] == 7
     assert arc.fundamental.shape == (3, 3)
-
-
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda system, orbit: lyapunov.two_orbit_exponents(system, orbit.x0, intervals=2),
-        lambda system, orbit: orbit.sensitivity(["e"]),
-        lambda system, orbit: continue_orbit(orbit, "e", (0.9, 1.0)),
-        lambda system, orbit: attractors(system, {"q": (0.1, 1.0), "v": 0.0, "n": 0}),
-    ],
-)
-def test_what_compares_whole_states_refuses_counters(call):
-    system = ball(restitution=1.0)
-    orbit = periodic_orbit(system, (0.5, 0.0), period=2.0)
-    with pytest.raises(ArgumentError, match="compares whole states, and a counter never comes back"):
-        call(system, orbit)
 
 
 @pytest.mark.parametrize("system", [ball(), sampled_loop(counters=())])

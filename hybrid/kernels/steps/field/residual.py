@@ -89,13 +89,13 @@ def _add_residual(model, run, tangents, path, s, weight, noisy, work):
 @njit(**KERNEL)
 def _is_small(model, method, run, tangents, margin, work):
     """Whether the integrals of a residual in ``work.error`` are within a margin of tolerances at the end."""
-    n = model.dimension
+    n, controlled = model.dimension, model.controlled
     for first in range(0, n * (1 + tangents), n):
         floor, square = method.atol, 0.0
-        for i in range(first, first + n if first > 0 else 0):
+        for i in range(first, first + controlled if first > 0 else 0):
             square += run.y[i] * run.y[i]
         if first > 0:
-            floor = method.rtol * math.sqrt(square / n) + 1e-300
+            floor = method.rtol * math.sqrt(square / controlled) + 1e-300
         for i in range(first, first + n):
             size = max(abs(run.y[i]), abs(work.trial[i]))
             if not work.error[i] <= margin * (floor + (method.rtol + ROUNDING) * size):

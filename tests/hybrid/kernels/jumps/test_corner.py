@@ -2,9 +2,11 @@
 
 from functools import cache
 
+import attrs
 import numpy as np
 import pytest
 
+import hybrid
 from hybrid import Guard, HybridSystem, Mode, Reset, StatusCode, Transition, simulate
 
 
@@ -105,6 +107,21 @@ class TestThreeBalls:
         assert not arc.status.ok
         assert arc.t[-1] == 2.0
         assert arc.jumps[0].transition == "12"
+
+    @pytest.mark.parametrize("derived", [lambda system: system, hybrid.split], ids=["itself", "split"])
+    def test_a_listed_order_that_is_meant_is_not_ambiguous(self, derived):
+        start, span = (-1.0, 0.0, 1.0, 1.0, 0.0, -1.0), (0.0, 2.0)
+        balls = three_balls((1.0, 2.0, 3.0), 0.5)
+        meant = derived(attrs.evolve(balls, listed_order=True))
+        plain, arc = simulate(balls, start, span), simulate(meant, start, span)
+        assert arc.status.code == StatusCode.SUCCESS
+        np.testing.assert_array_equal(arc.x, plain.x)
+        assert "listed order: decides" in repr(meant)
+        assert "listed_order=True" in plain.status.remedy
+        carried = simulate(meant, start, span, sensitivities=("e",))
+        marked = hybrid.poincare_section(meant, start, Guard(lambda t, x, p: x.x1 + 0.5, +1), points=1)
+        assert carried.status.ok
+        assert "AMBIGUOUS" not in marked.status.code.name
 
     def test_equal_elastic_balls_do_not(self):
         arc = simulate(three_balls(), (-1.0, 0.0, 1.0, 1.0, 0.0, -1.0), (0.0, 2.0))

@@ -112,7 +112,7 @@ def test_the_border_of_the_converter():
     """Below ``E = V_ref + V_L / a`` the switch stays closed."""
     converter = models.buck_converter()
     arc = simulate(converter, (12.0, 0.5, 0.0), (0.0, 0.08), mode="on", parameters={"E": 14.0})
-    orbit = periodic_orbit(converter, arc.x[-1], mode=str(arc.mode[-1]), period=4e-4, parameters={"E": 14.0})
+    orbit = periodic_orbit(converter, arc.x[-1], mode=str(arc.mode[-1]), parameters={"E": 14.0})
     found, ends = change(orbit, "E", (11.0, 15.0))
     assert found.kind == "border"
     assert found.value == pytest.approx(11.3 + 3.8 / 8.4, abs=1e-10)

@@ -163,7 +163,7 @@ def test_what_folds_and_flips_begin():
 def test_the_converter_doubles_its_period():
     converter = models.buck_converter()
     arc = simulate(converter, (12.0, 0.5, 0.0), (0.0, 0.08), mode="on", parameters={"E": 20.0})
-    orbit = periodic_orbit(converter, arc.x[-1], mode=str(arc.mode[-1]), period=4e-4, parameters={"E": 20.0})
+    orbit = periodic_orbit(converter, arc.x[-1], mode=str(arc.mode[-1]), parameters={"E": 20.0})
     branch = continue_orbit(orbit, "E", (15.0, 30.0))
     (flip,) = branch.bifurcations
     assert flip.kind == "flip"
