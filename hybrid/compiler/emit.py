@@ -23,20 +23,27 @@ from hybrid.compiler.bounds.residues import residue_of_guard, residues
 from hybrid.compiler.cases import cases_of_index, function_text
 from hybrid.compiler.curvature import curvature
 from hybrid.compiler.emitted import Emitted, Propagator
-from hybrid.compiler.jacobians import cells, gradient, slope_columns, with_time, zeros_first
+from hybrid.compiler.jacobians import (
+    cells,
+    gradient,
+    place_of,
+    slope_columns,
+    with_time,
+    zeros_first,
+)
 from hybrid.compiler.opaque import SLOPES, OpaqueFunction, check_plain
 from hybrid.compiler.parts import PARTS
 from hybrid.compiler.places import placed, places_of
 from hybrid.compiler.propagators.choice import propagator
 from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.readers import is_free, readers
-from hybrid.compiler.statements.code import Code, Statement, Term, at, call, get, put
+from hybrid.compiler.statements.code import Code, Statement, at, put
 from hybrid.compiler.statements.values import assignments, unprintable
 from hybrid.compiler.steep import fields_at_crossings, steep_at_guards, steep_inside
 from hybrid.compiler.surfaces import surfaces
 from hybrid.compiler.tables import Tables
 from hybrid.compiler.traced import Traces, expressions_of, period_of
-from hybrid.compiler.written import Written, beyond_guards, variational
+from hybrid.compiler.written import Written, beyond_guards, called, item, variational
 from hybrid.errors import ModelError
 from hybrid.expression.continuity import jumps_of, may_be_abrupt, may_jump
 from hybrid.expression.derivatives import jacobian_of
@@ -260,7 +267,7 @@ class _Writer:
         except ModelError as error:
             return self._write_opaque(function, targets, error)
         if function.derivative is None:
-            derivative = cells(self._cells(function), [entry for row in jacobian for entry in row])
+            derivative = cells(jacobian, place_of(function.size))
         else:
             derivative = self._given_derivative(function)
         given = function.derivative is not None
@@ -314,22 +321,22 @@ class _Writer:
         self, function: ModelFunction, targets: Sequence[Code], reason: ModelError
     ) -> list[Statement]:
         name = self._opaque_name(function, reason)
-        values = [_item("r", i) if i < function.returned else 0.0 for i in range(len(targets))]
-        return [_called("r", name), *map(put, targets, values)]
+        values = [item("r", i) if i < function.returned else 0.0 for i in range(len(targets))]
+        return [called("r", name), *map(put, targets, values)]
 
     def _complex_step(self, function: ModelFunction, reason: ModelError) -> list[Statement]:
         name, columns = self._opaque_name(function, reason), self.system.dimension + 1
         self.opaque[name] = attrs.evolve(self.opaque[name], slopes=True)
-        statements = [_called(f"r{j}", f"{name}{SLOPES}", j) for j in range(columns)]
+        statements = [called(f"r{j}", f"{name}{SLOPES}", j) for j in range(columns)]
         statements += [
-            put(self._cell(function, i, j), _item(f"r{j}", i))
+            put(place_of(function.size)(i, j), item(f"r{j}", i))
             for i in range(function.kept)
             for j in range(columns)
         ]
         return statements + self._memory_cells(function)
 
     def _given_derivative(self, function: ModelFunction) -> list[Statement]:
-        n, places = self.system.dimension, self._cells(function)
+        n = self.system.dimension
         try:
             entries = self.traced(function, derivative=True)
         except ModelError as reason:
@@ -337,14 +344,14 @@ class _Writer:
         width = len(entries) // function.rows
         zeros = [ZERO] * (n + 1 - width)
         rows = [[*entries[i * width : (i + 1) * width], *zeros] for i in range(function.rows)]
-        return cells(places, [entry for row in rows for entry in row])
+        return cells(rows, place_of(function.size))
 
     def _opaque_derivative(self, function: ModelFunction, reason: ModelError) -> list[Statement]:
         width = self.system.dimension + derivative_has_time_column(self.system.variables, function)
         name = self._opaque_name(function, reason, width)
-        statements = [_called("r", name)]
+        statements = [called("r", name)]
         statements += [
-            put(self._cell(function, i, j), _item("r", i * width + j))
+            put(place_of(function.size)(i, j), item("r", i * width + j))
             for i in range(function.kept)
             for j in range(width)
         ]
@@ -354,18 +361,11 @@ class _Writer:
         """Statements for the rows of a derivative that are not those of the user's function."""
         rows = function.memory_rows(self.system.dimension + 1)
         return [
-            put(self._cell(function, i, j), entry)
+            put(place_of(function.size)(i, j), entry)
             for i, row in enumerate(rows, function.kept)
             for j, entry in enumerate(row)
             if entry
         ]
-
-    def _cells(self, function: ModelFunction) -> list[Code]:
-        columns = range(self.system.dimension + 1)
-        return [self._cell(function, i, j) for i in range(function.size or 1) for j in columns]
-
-    def _cell(self, function: ModelFunction, i: int, j: int) -> Code:
-        return at("out", j) if function.size is None else at("out", i, j)
 
     def _opaque_name(self, function: ModelFunction, reason: ModelError, width: int | None = None) -> str:
         """Name of a function that stays opaque; with ``width``, of its derivative of so many columns."""
@@ -385,16 +385,6 @@ class _Writer:
         )
         self.opaque[name] = opaque
         return name
-
-
-def _called(target: str, name: str, *arguments: Term) -> Statement:
-    """The statement that calls a function of the user."""
-    return put(get(target), call(name, *map(get, ("t", "x", "p")), *arguments))
-
-
-def _item(name: str, place: int) -> Code:
-    """One of the numbers that a function of the user has returned."""
-    return call("item", get(name), place)
 
 
 def _check_printable(expressions: Iterable[Expression]) -> None:

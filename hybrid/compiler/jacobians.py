@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from hybrid.compiler.statements.code import Code, Statement, at, get, loop, put
@@ -13,10 +13,15 @@ from hybrid.expression.nodes import ZERO, Expression
 MANY_ZEROS = 50
 
 
-def cells(places: Sequence[Code], entries: Iterable[Expression]) -> list[Statement]:
-    """Statements for the cells of a derivative that are not zero."""
-    found = [(place, entry) for place, entry in zip(places, entries, strict=True) if entry is not ZERO]
-    return assignments([place for place, _ in found], [entry for _, entry in found])
+def cells(rows: Sequence[Sequence[Expression]], place: Callable[[int, int], Code]) -> list[Statement]:
+    """Statements for the cells of a derivative that are not zero, each in its place."""
+    found = [(i, j) for i, row in enumerate(rows) for j, entry in enumerate(row) if entry is not ZERO]
+    return assignments([place(*each) for each in found], [rows[i][j] for i, j in found])
+
+
+def place_of(size: int | None) -> Callable[[int, int], Code]:
+    """The places of the cells of a derivative; ``size`` is None for a gradient."""
+    return (lambda i, j: at("out", j)) if size is None else (lambda i, j: at("out", i, j))
 
 
 def written_cells(statements: Iterable[Statement]) -> list[tuple[int, ...]]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import attrs
 
-from hybrid.compiler.jacobians import cells
+from hybrid.compiler.jacobians import cells, place_of
 from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.statements.code import Code, Statement, Term, at, call, get, loop, put
 from hybrid.compiler.statements.values import assignments
@@ -36,6 +36,16 @@ class Written:
     given: bool = False
 
 
+def called(target: str, name: str, *arguments: Term) -> Statement:
+    """The statement that calls a function of the user."""
+    return put(get(target), call(name, *map(get, ("t", "x", "p")), *arguments))
+
+
+def item(name: str, place: int) -> Code:
+    """One of the numbers that a function of the user has returned."""
+    return call("item", get(name), place)
+
+
 def beyond_guards(field: Written, boundaries: Sequence[Boundary], symbols: Symbols) -> Written:
     """The field of a mode, with roots of its guards that are zero beyond the guard.
 
@@ -55,8 +65,7 @@ def beyond_guards(field: Written, boundaries: Sequence[Boundary], symbols: Symbo
     flat = all_replaced(entries, slopes)
     jacobian = [flat[i * (n + 1) : (i + 1) * (n + 1)] for i in range(n)]
     if not field.given:
-        places = [at("out", i, j) for i in range(n) for j in range(n + 1)]
-        derivative = cells(places, [entry for row in jacobian for entry in row])
+        derivative = cells(jacobian, place_of(n))
     value = assignments([at("out", i) for i in range(n)], expressions)
     return Written(value, derivative, expressions, jacobian, field.given)
 

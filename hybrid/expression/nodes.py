@@ -86,8 +86,7 @@ class Expression:
     is_power: ClassVar[bool] = False
     is_exponential: ClassVar[bool] = False
     own_traits: ClassVar[int] = 0
-    # What an operation has besides its arguments.
-    attached: Any = ()
+    attached: Any = ()  # what an operation has besides its arguments
 
     if TYPE_CHECKING:
         # What numbers, symbols, powers and functions have alone: ``is_number`` and its like tell which it is.
