@@ -84,6 +84,7 @@ def fire(parts, task, stop_cycle, stop_phase, max_jumps):
     if model.timed_jump[fired] == 1 and run.since_entry > 0.0 and is_late(task.method, run):
         parts.late_jump(model, task.method, run, fired, task.work)
     parts.jump(task, fired)
+    begin_stretch(model, run, time_left(model, run, stop_cycle, stop_phase))
     if model.target[fired] == NO_MODE:
         return TERMINAL
     if not may_accumulate(model, run, fired):
@@ -349,9 +350,7 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         code, span = step(parts, task, room)
         if code != GO_ON:
             return int(code)
-        if run.pending != NO_TRANSITION:
-            begin_stretch(model, run, remaining)
-        elif not gets_on(model, task.method, run, remaining):
+        if not gets_on(model, task.method, run, remaining):
             return STEP_TOO_SMALL
         go_forward(model, run, span)
         if model.timed[run.mode] == 1 and is_late(task.method, run):
