@@ -184,12 +184,6 @@ def _sign(factor: Expression, given: Sequence[tuple[Expression, int]]) -> int:
     return -1 if whole and follows(base, -1, given) else 0
 
 
-def switching_names(entries: Sequence[Expression], symbols: Symbols) -> list[str]:
-    """Names of the switching functions of the state or of time in expressions."""
-    found = {type(atom).__name__ for atom in nodes_of(SWITCHING, *entries) if moves(atom, symbols.variables)}
-    return sorted(found)
-
-
 def _first_atom(entries: Sequence[Expression], symbols: Symbols) -> Expression | None:
     """An innermost switching function; those in the condition of a choice come before its branches."""
     clean: set[Expression] = set()
