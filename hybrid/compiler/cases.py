@@ -15,12 +15,16 @@ from hybrid.compiler.statements.rolled import rolled
 Case = tuple[tuple[int, ...], str]
 
 
-def cases_of_index(bodies: Iterable[Sequence[Statement]]) -> list[Case]:
-    """The cases of a function, given its statements for each index; equal ones share a case."""
+def body_text(statements: Sequence[Statement]) -> str:
+    """Statements, with loops for those that repeat, as text; empty if there are none."""
+    return json.dumps(rolled(statements), separators=(",", ":")) if statements else ""
+
+
+def cases_of_index(bodies: Iterable[str]) -> list[Case]:
+    """The cases of a function, given the text of its statements for each index; equal ones share a case."""
     indices: dict[str, list[int]] = {}
-    for index, statements in enumerate(bodies):
-        if statements:
-            body = json.dumps(rolled(statements), separators=(",", ":"))
+    for index, body in enumerate(bodies):
+        if body:
             indices.setdefault(body, []).append(index)
     return [(tuple(places), body) for body, places in indices.items()]
 

@@ -20,7 +20,7 @@ import attrs
 from hybrid.compiler.bounds.forcing import forcings
 from hybrid.compiler.bounds.program import programs
 from hybrid.compiler.bounds.residues import residue_of_guard, residues
-from hybrid.compiler.cases import cases_of_index, function_text
+from hybrid.compiler.cases import body_text, cases_of_index, function_text
 from hybrid.compiler.curvature import curvature
 from hybrid.compiler.emitted import Emitted, Propagator
 from hybrid.compiler.jacobians import (
@@ -133,26 +133,26 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
     jacobians = [with_time(field.derivative, n) for field in evaluated]
     series = [each.series for each in propagators]
     places = places_of(series, with_room=system.growth is not None)
-    bodies: dict[str, Sequence[Sequence[Statement]]] = {
-        "field": [*(field.value for field in evaluated), *at_crossings],
-        "field_jacobian": jacobians,
-        "variational_field": [
-            writer.remembered(
-                ("variational", id(mode.field), id(mode.jacobian), tuple(around)),
-                partial(variational, field, n),
-            )
-            for mode, field, around in zip(system.modes, evaluated, boundaries, strict=True)
+    text = writer.text
+    bodies: dict[str, list[str]] = {
+        "field": [
+            *(text("value", each, each.value) for each in evaluated),
+            *map(body_text, at_crossings),
         ],
-        "guard": [*(guard.value for guard in guards), *(condition.value for condition in conditions)],
-        "guard_gradient": [gradient(guard.derivative, n) for guard in guards],
+        "field_jacobian": [
+            text("jacobian", each, jacobian) for each, jacobian in zip(evaluated, jacobians, strict=True)
+        ],
+        "variational_field": [text("variational", each, partial(variational, each, n)) for each in evaluated],
+        "guard": [text("value", each, each.value) for each in (*guards, *conditions)],
+        "guard_gradient": [text("gradient", each, partial(gradient, each.derivative, n)) for each in guards],
         "guard_curvature": [
-            curvature(expression, straight, symbols)
-            for expression, straight in zip(traced, affine, strict=True)
+            text(f"curvature {straight}", each, partial(curvature, expression, straight, symbols))
+            for each, expression, straight in zip(guards, traced, affine, strict=True)
         ],
-        "reset": [reset.value for reset in resets],
-        "reset_jacobian": [zeros_first(reset.derivative, n) for reset in resets],
-        "series": placed(places, [each.statements for each in series]),
-        "tangent_series": placed(places, [each.tangent_statements for each in series]),
+        "reset": [text("value", each, each.value) for each in resets],
+        "reset_jacobian": [text("slopes", each, partial(zeros_first, each.derivative, n)) for each in resets],
+        "series": placed(places, [text("series", each, each.statements) for each in series]),
+        "tangent_series": placed(places, [text("tangent", each, each.tangent_statements) for each in series]),
     }
     surface, orientation = writer.surfaces(traced)
     pulses = [
@@ -250,6 +250,17 @@ class _Writer:
         if key not in self._known:
             self._known[key] = make()
         found: Result = self._known[key]
+        return found
+
+    def text(
+        self, name: str, source: Any, statements: Sequence[Statement] | Callable[[], Sequence[Statement]]
+    ) -> str:
+        """Statements as text, or those that are made; written once for the object that they come from."""
+        # The object is kept with the text: the key is its identity.
+        found, _ = self.remembered(
+            ("text", name, id(source)),
+            lambda: (body_text(statements() if callable(statements) else statements), source),
+        )
         return found
 
     def write(self, function: ModelFunction) -> Written:

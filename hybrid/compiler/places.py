@@ -8,7 +8,6 @@ from itertools import accumulate
 import attrs
 
 from hybrid.compiler.emitted import Series
-from hybrid.compiler.statements.code import Statement, whole
 from hybrid.compiler.taylor.loops import padded
 from hybrid.kernels.types.codes import WIDE
 
@@ -43,9 +42,9 @@ def _power_of_two_from(count: int) -> int:
     return 1 << (count - 1).bit_length()
 
 
-def placed(places: Places, bodies: Sequence[Sequence[Statement]]) -> list[Sequence[Statement]]:
-    """The bodies of the series of all modes, each with its columns."""
+def placed(places: Places, bodies: Sequence[str]) -> list[str]:
+    """The texts of the series of all modes, each with its columns."""
     return [
-        [whole("table", table), whole("vectors", places.vectors), *body] if body else []
+        body and f'[["whole","table",{table}],["whole","vectors",{places.vectors}],{body[1:]}'
         for table, body in zip(places.tables, bodies, strict=True)
     ]
