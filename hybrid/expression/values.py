@@ -397,12 +397,14 @@ def _interpolated(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None,
 def _repeated(x: Any, points: np.ndarray, values: np.ndarray, period: Any) -> tuple[Any, Any, Any]:
     """Argument, points and values within one period, as NumPy makes them: the last point is also before it."""
     if isinstance(period, Traced) or period == 0.0:
-        raise refusal("np.interp needs a period that is a number: write np.interp(np.mod(t, T), times, values)")
-    period = abs(period)
-    order = np.argsort(points % period)
-    points, values = (points % period)[order], values[order]
-    around = np.concatenate([points[-1:] - period, points, points[:1] + period])
-    return x % period, around, np.concatenate([values[-1:], values, values[:1]])
+        raise refusal(
+            "np.interp needs a period that is a number: write np.interp(np.mod(t, T), times, values)"
+        )
+    length = abs(period)
+    order = np.argsort(points % length)
+    within, there = (points % length)[order], values[order]
+    around = np.concatenate([within[-1:] - length, within, within[:1] + length])
+    return x % length, around, np.concatenate([there[-1:], there, there[:1]])
 
 
 def _select(conditions: Any, choices: Any, default: Any = 0) -> Any:

@@ -423,6 +423,30 @@ def test_an_unknown_parameter_is_refused_with_the_known_ones():
         )
 
 
+@pytest.mark.parametrize(
+    ("clock", "period", "message"),
+    [
+        (Every(0.3), 1.0, "ticks every 0.3, not at the same phases again after 1"),
+        (At([0.5]), 1.0, "ticks at 0.5, not at the same phases again after 1"),
+        (Every(1.0), None, "the clock of transition 'tick' makes it depend on time"),
+    ],
+)
+def test_orbits_that_clocks_do_not_repeat_are_refused(clock, period, message):
+    system = HybridSystem(
+        state=("x",),
+        modes=[Mode("m", lambda t, x, p: (1.0 - x.x,))],
+        transitions=[Transition("m", "m", clock, Reset(lambda t, x, p: {"x": 0.5 * x.x}), name="tick")],
+        period=period,
+    )
+    with pytest.raises(ArgumentError, match=message):
+        hybrid.periodic_orbit(system, (0.4,), period=None if period else 1.0)
+    if isinstance(clock, Every) and period:
+        # Ten ticks of 0.3 are three periods of 1.
+        assert hybrid.periodic_orbit(system, (0.4,), periods=3).status.ok
+    if isinstance(clock, At):
+        assert hybrid.periodic_orbit(system, (0.4,), t0=0.5).multipliers == pytest.approx([math.exp(-1.0)])
+
+
 def test_a_period_of_zero_is_refused_at_the_run():
     with pytest.raises(ArgumentError, match="Transition 'off': Every: period must be positive"):
         hybrid.simulate(pwm(), (0.0,), (0.0, 1.0), parameters={"T": 0.0})
