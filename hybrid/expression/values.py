@@ -395,7 +395,7 @@ def _interpolated(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None,
 
 
 def _repeated(x: Any, points: np.ndarray, values: np.ndarray, period: Any) -> tuple[Any, Any, Any]:
-    """Argument, points and values within one period, as NumPy makes them: the last point is also before it."""
+    """Argument, points and values within a period, as NumPy has them: the last point is also before it."""
     if isinstance(period, Traced) or period == 0.0:
         raise refusal(
             "np.interp needs a period that is a number: write np.interp(np.mod(t, T), times, values)"
