@@ -61,7 +61,7 @@ class Table:
 
     def __init__(self, x: Any, y: Any = None, kind: str = "linear") -> None:
         kind = arguments.one_of("kind", kind, KINDS)
-        if y is None and hasattr(x, "c") and hasattr(x, "extrapolate"):
+        if y is None and all(hasattr(x, name) for name in ("c", "x", "extrapolate")):
             kind, pieces = "cubic", _of_spline(x)
             points, values = pieces.knots, pieces.at(pieces.knots)
         else:

@@ -386,10 +386,25 @@ def _interpolated(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None,
     except TraceError:
         raise refusal("np.interp needs points that are numbers: add up pieces with np.clip") from None
     if period is not None:
-        raise refusal("np.interp with period= cannot be traced: write np.interp(np.mod(t, T), times, values)")
+        x, points, values, left, right = *_repeated(x, points, values, period), None, None
+    if not (np.isfinite(points).all() and np.isfinite(values).all()):
+        raise refusal("np.interp needs points and values that are finite: leave the others out")
     if points.shape != values.shape or points.ndim != 1 or not (points.size and np.all(np.diff(points) > 0)):
         raise refusal("np.interp can be traced only for points that increase")
     return looked_up(lines(points, values, left, right), x)
+
+
+def _repeated(x: Any, points: np.ndarray, values: np.ndarray, period: Any) -> tuple[Any, Any, Any]:
+    """Argument, points and values within a period, as NumPy has them: the last point is also before it."""
+    if isinstance(period, Traced) or period == 0.0:
+        raise refusal(
+            "np.interp needs a period that is a number: write np.interp(np.mod(t, T), times, values)"
+        )
+    length = abs(period)
+    order = np.argsort(points % length)
+    within, there = (points % length)[order], values[order]
+    around = np.concatenate([within[-1:] - length, within, within[:1] + length])
+    return x % length, around, np.concatenate([there[-1:], there, there[:1]])
 
 
 def _select(conditions: Any, choices: Any, default: Any = 0) -> Any:

@@ -17,6 +17,7 @@ from hybrid.orbits.shooting import Shooting
 from hybrid.simulation.interrupt import CTRL_C, interrupted_status
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import DOP853, Solver
+from hybrid.system.clocks import Every, numbers_of
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.growth import growing
 from hybrid.transform.aged import aged, with_age
@@ -78,7 +79,7 @@ def periodic_orbit(
     ------
     ArgumentError
         If ``period`` is given for a forced system, missing for an autonomous one, or another argument does
-        not fit the system.
+        not fit the system; if a clock, such as `hybrid.Every`, does not repeat after the orbit's period.
 
     References
     ----------
@@ -113,8 +114,15 @@ def periodic_orbit(
             )
         point = Point(guess, t0, periods * forcing)
         compile_system(system)
+        _check_clocks(system, state, parameters, t0, point.period)
         with CTRL_C:
             return _shown(shooting.hinted(shooting.newton(point, False, tolerance, max_iterations), point))
+    ticking = [each.name for each in system.transitions if each.clock and not each.clock.counts_from_entry]
+    if ticking:
+        raise ArgumentError(
+            f"system: the clock of transition {ticking[0]!r} makes it depend on time, so it has orbits only "
+            "of a forcing period. Declare HybridSystem(period=...)."
+        )
     if period is None:
         raise ArgumentError("An autonomous system needs a guess of its period: give period=.")
     length = arguments.positive("period", period)
@@ -124,6 +132,31 @@ def periodic_orbit(
     with CTRL_C:
         point = Point(guess, t0, length)
         return _shown(shooting.hinted(shooting.autonomous(point, tolerance, max_iterations), point))
+
+
+def _check_clocks(
+    system: HybridSystem, x: np.ndarray, parameters: Mapping[str, float] | None, t0: float, length: float
+) -> None:
+    """ArgumentError if a clock does not tick at the same phases again after the length of an orbit."""
+    variables = system.variables
+    view, p = variables.state_view(x), variables.parameter_view(system.parameter_values(parameters).tolist())
+    for transition in system.transitions:
+        clock = transition.clock
+        if clock is None or clock.counts_from_entry:
+            continue
+        numbers = np.array(numbers_of(clock, view, p), dtype=float)
+        if clock.number == Every.number:
+            ratio = length / numbers[0]
+            # The period and the length are rounded, each by some operations.
+            repeats = abs(ratio - round(ratio)) <= 8 * np.finfo(float).eps * ratio
+        else:
+            repeats = not np.any((t0 < numbers) & (numbers <= t0 + length))
+        if not repeats:
+            raise ArgumentError(
+                f"periods: the clock of transition {transition.name!r} ticks {clock.told}, not at the same "
+                f"phases again after {length:.6g}, so no orbit closes then. Choose periods= or the system's "
+                "period= such that it does; the times of At never come again."
+            )
 
 
 def _shown(orbit: PeriodicOrbit) -> PeriodicOrbit:

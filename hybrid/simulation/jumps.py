@@ -160,15 +160,16 @@ class Jumps(Sequence[Jump]):
 
     Attributes
     ----------
+    t
+        Times ``(jumps,)``.
     transversality
         As in :class:`Jump`, ``(jumps,)``.
     """
 
     system: HybridSystem
     _parameters: np.ndarray
-    _period: float
+    t: np.ndarray
     _phase: np.ndarray
-    _cycle: np.ndarray
     _transition: np.ndarray
     transversality: np.ndarray
     _kind: np.ndarray
@@ -195,11 +196,6 @@ class Jumps(Sequence[Jump]):
     def t_gradient(self) -> np.ndarray:
         """Derivatives ``(jumps, n)`` of the times in the start; as ``t_sensitivity``."""
         return known(self._sensitivities).times[:, : self.system.tangent_dimension]
-
-    @cached_property
-    def t(self) -> np.ndarray:
-        """Times ``(jumps,)``."""
-        return self._cycle * self._period + self._phase
 
     @property
     def transition_index(self) -> np.ndarray:

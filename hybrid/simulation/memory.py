@@ -201,7 +201,7 @@ def record_layout(dimension: int, degree: int, steps: int, jumps: int) -> Any:
         "step_time": (steps, 3),
         "step_place": (steps, 3),
         "step_coefficients": (steps, degree + 1, n + 1),
-        "jump_time": (jumps, 2),
+        "jump_time": (jumps, 3),
         "jump_place": (jumps, 4),
         "jump_states": (jumps, 2, n),
         "jump_saltation": (jumps, n, n),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from math import floor, ulp
+from math import floor, frexp, ldexp, ulp
+
+import numpy as np
 
 from hybrid.errors import ArgumentError
 
@@ -30,3 +32,14 @@ def split_time(t: float, period: float) -> tuple[int, float]:
     cycle = floor(t / period)
     phase = t - cycle * period
     return (cycle + 1, 0.0) if phase >= period else (cycle, max(phase, 0.0))
+
+
+def time_at(cycle: np.ndarray, phase: np.ndarray, low: np.ndarray, period: float) -> np.ndarray:
+    """Times of phases in two parts, rounded once: whole periods have more digits than a number."""
+    # Each half of the digits of a period times a whole number is exact, or as good as that.
+    mantissa, exponent = frexp(period)
+    high = ldexp(float(np.float32(mantissa)), exponent)
+    whole, rest = cycle * high, cycle * (period - high)
+    total = whole + phase
+    part = total - whole
+    return total + ((whole - (total - part)) + (phase - part) + (rest + low))

@@ -17,7 +17,7 @@ from hybrid.simulation.arc import HybridArc, Pieces, hybrid_points, join, withou
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.jumps import Grazing, Jumps
 from hybrid.simulation.memory import empty_record, memory_for_records, record_layout
-from hybrid.simulation.periods import check_time
+from hybrid.simulation.periods import check_time, time_at
 from hybrid.simulation.sensitivity import with_sensitivities
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
@@ -239,7 +239,7 @@ class _Recorder:
             return None
         model = self.trajectory.model
         columns: Any = join(self.jumps) if self.jumps else _no_jumps(model.dimension)
-        return Jumps(self.trajectory.system, self.trajectory.parameters, model.period, *columns)
+        return Jumps(self.trajectory.system, self.trajectory.parameters, *columns)
 
     def _advance(self, t1: float, max_jumps: int) -> int:
         """Run until the record is full or the run ends; the code."""
@@ -253,7 +253,7 @@ class _Recorder:
         period = self.trajectory.model.period
         steps, jumps, grazings, matrices = record.used.tolist()
         if jumps and self.keeps_jumps:
-            self._keep(self.jumps, _jump_columns(record, jumps, matrices))
+            self._keep(self.jumps, _jump_columns(record, jumps, matrices, period))
         if grazings:
             self.grazings += _grazings(self.trajectory.system, record, grazings, period)
         if self.times is None:
@@ -300,20 +300,21 @@ def _places_of_steps(
     """Start in two parts, length, mode and jump count of the steps in a record."""
     phase, low, length = record.step_time[:used].T.copy()
     cycle, mode, jumps = record.step_place[:used].T.copy()
-    return cycle * period + phase, low, length, mode, jumps
+    return time_at(cycle, phase, low, period), low, length, mode, jumps
 
 
 @cache
 def _no_jumps(dimension: int) -> tuple[np.ndarray, ...]:
     """Columns of jumps, empty, so that any number of arcs can have the same."""
-    return _jump_columns(empty_record(dimension, 0), 0, 0)
+    return _jump_columns(empty_record(dimension, 0), 0, 0, 0.0)
 
 
-def _jump_columns(record: Any, used: int, matrices: int) -> tuple[np.ndarray, ...]:
-    phase, transversality = record.jump_time[:used].T.copy()
+def _jump_columns(record: Any, used: int, matrices: int, period: float) -> tuple[np.ndarray, ...]:
+    phase, low, transversality = record.jump_time[:used].T.copy()
     cycle, transition, kind, has_matrix = record.jump_place[:used].T.copy()
     states, saltation = record.jump_states[:used].copy(), record.jump_saltation[:matrices].copy()
-    return phase, cycle, transition, transversality, kind, has_matrix, states, saltation
+    t = time_at(cycle, phase, low, period)
+    return t, phase, transition, transversality, kind, has_matrix, states, saltation
 
 
 def _grazings(system: HybridSystem, record: Any, used: int, period: float) -> list[Grazing]:

@@ -16,7 +16,7 @@ from hybrid.kernels.types.codes import UNLIMITED
 from hybrid.simulation.initial_mode import choose_mode
 from hybrid.simulation.interrupt import CTRL_C, FIRST_BURST, Bursts, Stop
 from hybrid.simulation.memory import Memory, put_tangents
-from hybrid.simulation.periods import check_time, split_time
+from hybrid.simulation.periods import check_time, split_time, time_at
 from hybrid.simulation.plan import Plan, check_solver, plan_of
 from hybrid.solvers import Solver
 from hybrid.system.entries import has_age
@@ -177,7 +177,7 @@ class Trajectory:
     def t(self) -> float:
         """Current time."""
         run = self.run
-        return run.cycle * self.model.period + run.phase
+        return float(time_at(run.cycle, run.phase, run.phase_low, self.model.period))
 
     @property
     def x(self) -> np.ndarray:

@@ -60,7 +60,8 @@ def rounding_of_tick(model, run, transition, k):
         return EPSILON * (abs(k * run.ticks[first]) + abs(run.ticks[first + 1]))
     if kind == AT:
         return EPSILON * abs(run.ticks[first + min(k, model.first_tick[transition + 1] - first - 1)])
-    return EPSILON * run.ticks[first]
+    entry = run.entry_cycle * model.period + run.entry_phase
+    return EPSILON * (abs(entry) + run.ticks[first])
 
 
 @njit(**KERNEL)

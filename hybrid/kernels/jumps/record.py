@@ -15,7 +15,7 @@ def remember_jump(run, record, transition, transversality, kind, known, x_plus, 
     n, slot = record.jump_states.shape[2], record.jumps
     if slot == record.jump_phase.shape[0]:
         return
-    record.jump_phase[slot] = run.phase
+    record.jump_phase[slot], record.jump_low[slot] = run.phase, run.phase_low
     record.jump_cycle[slot] = run.cycle
     record.jump_transition[slot] = transition
     record.jump_transversality[slot] = transversality

@@ -402,7 +402,7 @@ class Record(
     used=("steps", "jumps", "grazings", "matrices"),
     step_time=("step_phase", "step_low", "step_length"),
     step_place=("step_cycle", "step_mode", "step_jumps"),
-    jump_time=("jump_phase", "jump_transversality"),
+    jump_time=("jump_phase", "jump_low", "jump_transversality"),
     jump_place=("jump_cycle", "jump_transition", "jump_kind", "jump_has_matrix"),
     grazing_time=("grazing_phase", "grazing_value", "grazing_acceleration"),
     grazing_place=("grazing_cycle", "grazing_transition", "grazing_jumps"),

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.interpolate import CubicSpline, PchipInterpolator, make_interp_spline
 
 from hybrid import (
     DOP853,
@@ -231,6 +231,26 @@ def test_values_at_numbers_and_arrays():
     np.testing.assert_array_equal(table([[-1.0, 0.0], [1.0, np.inf]]), [[2.0, 2.0], [4.0, 4.0]])
     assert np.isnan(table(np.nan))
     np.testing.assert_array_equal(Table([0.0, 1.0], [2.0, 4.0], kind="step")([-1.0, 0.9, 1.0]), [2, 2, 4])
+
+
+def test_interp_with_a_period():
+    times, values = [0.5, 4.0, 2.0], [1.0, 3.0, -2.0]
+    system = tank(lambda t, x, p: (np.interp(t, times, values, period=5.0),))
+    arc = simulate(system, (0.0,), (0.0, 12.3))
+    knots = np.union1d(np.add.outer([0.5, 2.0, 4.0], [0.0, 5.0, 10.0]), [0.0, 12.3])
+    knots = knots[knots <= 12.3]
+    middle = np.interp((knots[1:] + knots[:-1]) / 2, times, values, period=5.0)
+    assert arc.x[-1, 0] == pytest.approx(np.diff(knots) @ middle, rel=1e-12)
+
+
+def test_interp_of_what_is_not_finite_is_refused():
+    with pytest.raises(ModelError, match=r"np\.interp needs points and values that are finite"):
+        compile_system(tank(lambda t, x, p: (np.interp(t, [0.0, 1.0, 2.0], [0.0, np.nan, 1.0]),)))
+
+
+def test_a_spline_of_scipy_in_another_form_is_refused():
+    with pytest.raises(ArgumentError, match="unless x is a Series, a DataArray or a spline"):
+        Table(make_interp_spline(TIMES, VALUES))
 
 
 def test_a_spline_of_scipy_is_told_what_to_write():
