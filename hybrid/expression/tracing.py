@@ -13,12 +13,13 @@ from hybrid.errors import ModelError
 from hybrid.expression.graph import Group, is_larger_than, nodes
 from hybrid.expression.nodes import Expression, Number, Symbol, number
 from hybrid.expression.pieces import Pieces
+from hybrid.expression.splines import teach_splines
 from hybrid.expression.tabulated import Tabulated
 from hybrid.expression.text import text
 from hybrid.expression.ufuncs import RULES
+from hybrid.expression.values import NEEDS_TABLE, values_of
 from hybrid.expression.values import Traced as Traced
 from hybrid.expression.values import TraceError as TraceError
-from hybrid.expression.values import values_of
 
 # Largest number of operations of an expression shown in an error text.
 SHOWN = 100
@@ -112,7 +113,9 @@ def trace(
     symbols = model_symbols(state if isinstance(state, int) else len(state), len(names))
     try:
         expressions = values_of(function, state, names, SYMBOLIC, (symbols.t, symbols.x, symbols.p))
-    except ModelError:
+    except ModelError as error:
+        if str(error) == NEEDS_TABLE and teach_splines():
+            return trace(function, state, names)
         raise
     except Exception as error:
         raise TraceError(_told(error)) from error

@@ -253,10 +253,15 @@ def test_a_spline_of_scipy_in_another_form_is_refused():
         Table(make_interp_spline(TIMES, VALUES))
 
 
-def test_a_spline_of_scipy_is_told_what_to_write():
-    spline = CubicSpline(TIMES, VALUES)
-    with pytest.raises(ModelError, match=r"call hybrid\.Table\(spline\)"):
-        compile_system(tank(lambda t, x, p: (spline(t),)))
+@pytest.mark.parametrize("kind", [CubicSpline, PchipInterpolator])
+def test_splines_of_scipy_are_called_as_they_are(kind):
+    spline = kind(TIMES, VALUES)
+    assert filled(lambda t, x, p: (spline(t),), TIMES[-1]) == pytest.approx(
+        spline.integrate(0.0, TIMES[-1]), abs=1e-11
+    )
+    slope = filled(lambda t, x, p: (spline(t, 1),), TIMES[-1])
+    assert slope == pytest.approx(spline(TIMES[-1]) - spline(0.0), abs=1e-11)
+    assert spline([1.0, 2.0]).shape == (2,)
 
 
 @pytest.mark.parametrize(
