@@ -87,29 +87,47 @@ class Knots:
         return self._found(values) if self._fixed is None else self._fixed
 
     def _found(self, values: np.ndarray) -> dict[str, np.ndarray]:
-        repeats, groups = [], []
+        repeats, groups, bounds = [], [], []
         for repeat, tables in self.groups:
             length = 0.0 if repeat is None else self._number(repeat, values)
-            if repeat is None:
-                knots = np.concatenate([self._times(node, values) for node in tables])
-            else:
-                # The period itself is a point: there the table begins again.
-                knots = np.concatenate([*(node.pieces.knots for node in tables), [length]])
-                knots[~((knots > 0.0) & (knots <= length))] = np.inf
             repeats.append(length if 0.0 < length < np.inf else 0.0)
-            groups.append(np.sort(knots))
+            if repeat is None:
+                knots = np.sort(np.concatenate([self._times(node, values) for node in tables]))
+                bounds.append(np.nextafter(knots, -np.inf))
+            else:
+                found = [self._times_in_period(node, values, length) for node in tables]
+                knots = np.concatenate([*(times for times, _ in found), [length]])
+                order = np.argsort(knots)
+                knots = knots[order]
+                bounds.append(knots - np.concatenate([*(bands for _, bands in found), [0.0]])[order])
+            groups.append(knots)
         knots = np.concatenate([np.empty(0), *groups])
         return {
             "first_group": self.first_group,
             "repeat": np.array(repeats, dtype=float),
             "first_knot": np.cumsum([0, *map(len, groups)], dtype=np.int64),
             "knots": knots,
-            "before_knots": np.nextafter(knots, -np.inf),
+            "before_knots": np.concatenate([np.empty(0), *bounds]),
         }
 
-    def _number(self, expression: Expression, values: np.ndarray) -> float:
+    def _number(self, expression: Expression, values: np.ndarray, t: float = 0.0) -> float:
         known = dict(zip(self.symbols.p, values, strict=False))
-        return float(Program([expression]).run(known)[0])
+        return float(Program([expression]).run({**known, self.symbols.t: t})[0])
+
+    def _times_in_period(
+        self, node: Tabulated, values: np.ndarray, length: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Times in a period at which ``(a t + b) % T`` is at a knot or begins again, and their rounding."""
+        inner, within = node.args[0].args
+        around = self._number(within, values)
+        start, end = (self._number(inner, values, t) for t in (0.0, 1.0))
+        knots = np.append(node.pieces.knots[(node.pieces.knots > 0.0) & (node.pieces.knots < around)], 0.0)
+        with np.errstate(all="ignore"):
+            times = ((knots - start) / (end - start)) % length
+            bands = MARGIN * (np.abs(knots) + abs(start)) / abs(end - start)
+        times[times == 0.0] = length
+        times[~(times > 0.0)] = np.inf
+        return times, np.where(start == 0.0, 0.0, bands)
 
     def _times(self, node: Tabulated, values: np.ndarray) -> np.ndarray:
         """The first times at which the argument of a table has reached its knots, in floating point."""

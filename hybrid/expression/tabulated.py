@@ -7,9 +7,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from hybrid.expression.graph import Group, all_replaced, degree_of, mentions, nodes_of, symbols_of
-from hybrid.expression.nodes import ZERO, Expression, Symbol, _kept, add, number
-from hybrid.expression.operations import Less, RealFunction, Remainder, Select
+from hybrid.expression.graph import Group, all_replaced, degree_of, mentions, nodes_of, replaced, symbols_of
+from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol, _kept, add, number
+from hybrid.expression.operations import Absolute, Less, RealFunction, Remainder, Select
 from hybrid.expression.pieces import Pieces
 from hybrid.expression.ranges import Range, closed
 from hybrid.expression.values import looked_up
@@ -71,7 +71,7 @@ class Tabulated(RealFunction):
 
 
 def has_knots_in_time(node: Expression) -> bool:
-    """Whether a node is a table of ``a t + b``, or of ``t % T``: its knots end steps.
+    """Whether a node is a table of ``a t + b``, or of ``(a t + b) % T``: its knots end steps.
 
     ``a``, ``b`` and ``T`` are made of numbers and parameters.
     """
@@ -81,8 +81,7 @@ def has_knots_in_time(node: Expression) -> bool:
     names = {each.label for each in symbols_of(argument)}
     if "t" not in names or any(name.startswith("x[") for name in names):
         return False
-    time = Symbol("t")
-    return repeat_of(node) is not None or degree_of(argument, frozenset((time,))) == 1
+    return repeat_of(node) is not None or _is_affine(argument)
 
 
 def tables_of_time(*expressions: Expression) -> set[Tabulated]:
@@ -91,11 +90,18 @@ def tables_of_time(*expressions: Expression) -> set[Tabulated]:
 
 
 def repeat_of(node: Tabulated) -> Expression | None:
-    """``T`` of a table of ``t % T``; None for other tables."""
+    """The period in time of a table of ``(a t + b) % T``; None for other tables."""
     argument, time = node.args[0], Symbol("t")
-    if isinstance(argument, Remainder) and argument.args[0] is time and not argument.args[1].mask & time.mask:
-        return argument.args[1]
-    return None
+    if not isinstance(argument, Remainder) or argument.args[1].mask & time.mask:
+        return None
+    inner, length = argument.args
+    if not _is_affine(inner):
+        return None
+    return length / Absolute(replaced(inner, {time: ONE}) - replaced(inner, {time: ZERO}))
+
+
+def _is_affine(argument: Expression) -> bool:
+    return degree_of(argument, frozenset((Symbol("t"),))) == 1
 
 
 def in_branches(expressions: Iterable[Expression], states: Iterable[Symbol]) -> list[Expression]:

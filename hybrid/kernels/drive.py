@@ -256,7 +256,7 @@ def next_knot(model, run):
         at, before = model.knots[place], model.before_knots[place]
         if repeat > 0.0:
             middle = run.phase - within + at
-            apart = ROUNDING_OF_KNOT * abs(middle)
+            apart = ROUNDING_OF_KNOT * abs(middle) + (at - before)
             at, before = middle + apart, middle - apart
         if at < knot:
             last, knot = before, at

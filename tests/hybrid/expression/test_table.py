@@ -298,6 +298,25 @@ def test_a_cycle_that_repeats(kind, declared):
         assert arc["q"][-1] == pytest.approx(2.0 * integral(cycle, 3.0), rel=1e-13)
 
 
+@pytest.mark.parametrize(
+    "argument",
+    [
+        lambda t, p: (t - 0.3) % 5.0,
+        lambda t, p: (2.0 * t) % 5.0,
+        lambda t, p: (1.3 - 2.0 * t) % 5.0,
+        lambda t, p: (p.a * t + p.b) % p.T,
+    ],
+)
+def test_a_cycle_that_is_shifted_or_stretched(argument):
+    """Twenty, or forty, cycles of a pulse of a thousandth, whichever way they are passed."""
+    pulse = Table([0.0, 1.0, 1.001, 5.0], [0.0, 1000.0, 3.0, 0.0], kind="step")
+    system = tank(lambda t, x, p: (pulse(argument(t, p)),), a=2.0, b=0.7, T=5.0)
+    arc = simulate(system, (0.0,), (0.0, 100.0))
+    # The ends of a pulse of height 1000 are as exact as the times.
+    assert arc["q"][-1] == pytest.approx(20 * (1.0 + 3.0 * 3.999), abs=1e-9)
+    assert len(arc.t) < 200
+
+
 def test_cycles_of_different_lengths():
     one, other = (Table(TIMES, VALUES + shift, kind="step") for shift in (0.0, 1.0))
     found = filled(lambda t, x, p: (one(t % 3.0) + other(t % 4.0) + one(t),), end=12.0)
