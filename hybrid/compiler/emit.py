@@ -130,7 +130,6 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
         for mode, field, around in zip(system.modes, fields, boundaries, strict=True)
     ]
     crossing, at_crossings = fields_at_crossings(system, fields, steep, guards, resets, boundaries, symbols)
-    jacobians = [with_time(field.derivative, n) for field in evaluated]
     series = [each.series for each in propagators]
     places = places_of(series, with_room=system.growth is not None)
     text = writer.text
@@ -140,7 +139,7 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
             *map(body_text, at_crossings),
         ],
         "field_jacobian": [
-            text("jacobian", each, jacobian) for each, jacobian in zip(evaluated, jacobians, strict=True)
+            text("jacobian", each, partial(with_time, each.derivative, n)) for each in evaluated
         ],
         "variational_field": [text("variational", each, partial(variational, each, n)) for each in evaluated],
         "guard": [text("value", each, each.value) for each in (*guards, *conditions)],
@@ -188,7 +187,7 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
         forcing_kind=tuple(each.kind for each in forcing),
         first_residue=tuple(accumulate(map(len, residual), initial=0)),
         residue_component=tuple(each.component for each in cancelling),
-        slope_columns=tuple(slope_columns(each, n) for each in jacobians),
+        slope_columns=tuple(slope_columns(each.derivative, n) for each in evaluated),
         traced_field=tuple(field.expressions is not None for field in fields),
         surface=surface,
         orientation=orientation,

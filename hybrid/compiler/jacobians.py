@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from itertools import product
 from typing import Any
 
 from hybrid.compiler.statements.code import Code, Statement, at, get, loop, put
@@ -32,24 +33,26 @@ def written_cells(statements: Iterable[Statement]) -> list[tuple[int, ...]]:
 
 def gradient(statements: Sequence[Statement], n: int) -> list[Statement]:
     """Statements for all cells of a gradient ``(n + 1,)``."""
-    known = set(written_cells(statements))
-    return [*statements, *(put(at("out", j), 0.0) for j in range(n + 1) if (j,) not in known)]
+    return _with_zeros(statements, ((j,) for j in range(n + 1)))
 
 
 def zeros_first(statements: Sequence[Statement], n: int) -> list[Statement]:
     """Statements for all cells of a matrix ``(n, n + 1)``; a loop writes zeros if there are many."""
-    known = set(written_cells(statements))
-    if n * (n + 1) - len(known) < MANY_ZEROS:
-        zeros = ((i, j) for i in range(n) for j in range(n + 1) if (i, j) not in known)
-        return [*statements, *(put(at("out", i, j), 0.0) for i, j in zeros)]
+    if n * (n + 1) - len(set(written_cells(statements))) < MANY_ZEROS:
+        return _with_zeros(statements, product(range(n), range(n + 1)))
     row = [loop("j", 0, n + 1, [put(at("out", get("i"), get("j")), 0.0)])]
     return [loop("i", 0, n, row), *statements]
 
 
 def with_time(statements: Sequence[Statement], n: int) -> list[Statement]:
     """Statements for the Jacobian of a field: cells that are zero are left alone, but for those of time."""
+    return _with_zeros(statements, ((i, n) for i in range(n)))
+
+
+def _with_zeros(statements: Sequence[Statement], places: Iterable[tuple[int, ...]]) -> list[Statement]:
+    """Statements that write zero to those of these cells that no other statement writes."""
     known = set(written_cells(statements))
-    return [*statements, *(put(at("out", i, n), 0.0) for i in range(n) if (i, n) not in known)]
+    return [*statements, *(put(at("out", *place), 0.0) for place in places if place not in known)]
 
 
 def slope_columns(statements: Sequence[Statement], n: int) -> tuple[tuple[int, ...], ...]:

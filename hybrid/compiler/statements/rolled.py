@@ -10,7 +10,7 @@ Nothing is known of chains, rings or lattices here, and neither is of fields or 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -44,7 +44,7 @@ def rolled(statements: Sequence[Statement]) -> Sequence[Statement]:
         return statements
     roller = _Roller(statements)
     plan = roller.planned(statements)
-    if not roller.cells and not roller.has_loops:
+    if not roller.has_loops:
         return statements
     arrays = [("array", name, roller.sizes[kind]) for kind, name in CELLS.items() if roller.sizes[kind]]
     return [*arrays, *roller.written(plan)]
@@ -53,13 +53,11 @@ def rolled(statements: Sequence[Statement]) -> Sequence[Statement]:
 def _simple(statements: Iterable[Statement]) -> Iterator[Statement]:
     """All statements but loops and branches, also those in them."""
     for statement in statements:
-        if statement[0] == "for":
-            yield from _simple(statement[5])
-        elif statement[0] == "when":
-            yield from _simple(statement[2])
-            yield from _simple(statement[3])
-        else:
+        bodies = _bodies(statement)
+        if not bodies:
             yield statement
+        for body in bodies:
+            yield from _simple(body)
 
 
 @attrs.frozen
@@ -221,28 +219,34 @@ class _Roller:
         is_name = isinstance(value, tuple) and value[0] == "get" and self.uses[value[1]] == 2
         return value[1] if is_name else None
 
-    def _shape(self, term: Any, slots: list[Any]) -> Any:
-        """A statement or a term without its numbers and variables, which are appended to ``slots``."""
+    def _shape(self, statement: Statement, slots: list[Any]) -> Any:
+        """A statement without its numbers and variables, which are appended to ``slots``."""
+
+        def taken(value: Any) -> Any:
+            slots.append(value)
+            if type(value) is str:
+                return self.kinds[value]
+            # A negative zero equals zero, but is another number.
+            return "-0.0" if str(value) == "-0.0" else type(value)
+
+        return self._with_slots(statement, taken)
+
+    def _with_slots(self, term: Any, slot: Callable[[Any], Any]) -> Any:
+        """A statement or a term with the results of ``slot`` for its numbers and variables."""
         kind = type(term)
         if kind is int or kind is float:
-            slots.append(term)
-            # A negative zero equals zero, but is another number.
-            return "-0.0" if str(term) == "-0.0" else kind
+            return slot(term)
         if kind is str:
             return term
         if term[0] == "get":
             name = term[1]
             if name in self.whole:
-                slots.append(self.whole[name])
-                return int
-            if self.kinds.get(name) in CELLS:
-                slots.append(name)
-                return self.kinds[name]
-            return term
+                return slot(self.whole[name])
+            return slot(name) if self.kinds.get(name) in CELLS else term
         known = KNOWN.get(term[0], ())
         # The operation comes before the arguments.
-        return tuple(
-            part if place - 1 in known else self._shape(part, slots) for place, part in enumerate(term)
+        return Code(
+            part if place - 1 in known else self._with_slots(part, slot) for place, part in enumerate(term)
         )
 
     def _allot_cells(self, members: Sequence[Statement], slots: Sequence[Sequence[Any]]) -> None:
@@ -293,23 +297,8 @@ class _Roller:
 
     def _loop(self, group: _Repeated) -> Statement:
         columns = iter([self._varying(column) for column in zip(*group.slots, strict=True)])
-        body = self._filled(group.statements[0], columns)
+        body = self._with_slots(group.statements[0], lambda _: next(columns))
         return ("repeat", TURN[1], len(group.statements), (body,))
-
-    def _filled(self, term: Any, columns: Iterator[Any]) -> Any:
-        """The first statement of a group, with what varies in the place of its numbers and variables."""
-        kind = type(term)
-        if kind is int or kind is float:
-            return next(columns)
-        if kind is str:
-            return term
-        if term[0] == "get":
-            name = term[1]
-            return next(columns) if name in self.whole or self.kinds.get(name) in CELLS else term
-        known = KNOWN.get(term[0], ())
-        return Code(
-            part if place - 1 in known else self._filled(part, columns) for place, part in enumerate(term)
-        )
 
     def _varying(self, column: Sequence[Any]) -> Any:
         """A number or a variable that differs from turn to turn."""
