@@ -34,6 +34,26 @@ def test_eigenvectors_of_a_linear_map(toral):
     assert len(toral) == 100
 
 
+@pytest.mark.parametrize(("a", "b"), [(0.3, 1.2), (1.2, 0.3), (0.7, 0.7)])
+def test_the_angle_between_two_planes_is_the_smallest_between_their_directions(a, b):
+    """Expanding directions ``e1, e2``; contracting ones at principal angles ``a`` and ``b`` to them."""
+    directions = np.eye(4)
+    directions[:, 2], directions[:, 3] = [np.cos(a), 0, np.sin(a), 0], [0, np.cos(b), 0, np.sin(b)]
+    matrix = directions @ np.diag([3.0, 2.0, 0.5, 0.4]) @ np.linalg.inv(directions)
+    names = ("w", "x", "y", "z")
+
+    def image(t, x, p):
+        return tuple(
+            sum(float(each) * getattr(x, name) for each, name in zip(row, names, strict=True)) for row in matrix
+        )
+
+    found = lyapunov.covariant_vectors(
+        clocked(names, image), (0.0, 0.0, 0.0, 0.0, 0.5), interval=1.0, intervals=20, transient=200
+    )
+    np.testing.assert_allclose(found.exponents, [np.log(3), np.log(2), 0.0, np.log(0.5), np.log(0.4)], atol=1e-9)
+    np.testing.assert_allclose(found.angles, min(a, b), rtol=1e-9)
+
+
 def test_labelled(toral):
     found = toral.to_xarray()
     assert found.vectors.dims == ("sample", "state", "exponent")

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from scipy.interpolate import CubicSpline, PchipInterpolator, make_interp_spline
+from scipy.interpolate import CubicSpline, PPoly, PchipInterpolator, make_interp_spline
 
 from hybrid import (
     DOP853,
@@ -196,6 +196,20 @@ def test_a_jump_in_the_state_is_told_and_a_surface_for_split():
     smooth = tank(lambda t, x, p: (stairs(t),))
     assert "jumps" not in str(compile_system(smooth))
     assert simulate(split(smooth), (0.0,), (0.0, 2.0))["q"][-1] == pytest.approx(3.0, abs=1e-14)
+
+
+@pytest.mark.parametrize("pieces", range(2, 9))
+def test_each_piece_of_a_table_that_jumps_in_the_state_lies_between_its_own_points(pieces):
+    """``q' = a + b (q - knot)`` on each piece crosses the piece in the time ``log(1 + b length / a) / b``."""
+    random = np.random.default_rng(pieces)
+    knots = np.cumsum(0.5 + random.random(pieces + 1))
+    rates, starts = random.uniform(0.1, 1.0, pieces), random.uniform(0.5, 2.0, pieces)
+    speed = Table(PPoly(np.array([rates, starts]), knots, extrapolate=True))
+    apart = from_equations(lambda t, x, p: (speed(x.q),), state=("q",))
+    crossed = np.cumsum(np.log1p(rates * np.diff(knots) / starts) / rates)
+    arc = simulate(apart, (knots[0],), (0.0, crossed[-1] - 0.01))
+    np.testing.assert_allclose(arc.jumps.t, crossed[:-1], rtol=1e-9)
+    np.testing.assert_allclose(arc.jumps.x_plus[:, 0], knots[1:-1], rtol=1e-9)
 
 
 def test_a_state_slides_on_a_jump_of_a_table():
