@@ -269,11 +269,12 @@ class HybridArc:
             raise ArgumentError(
                 "This arc keeps samples only. Run simulate without samples= for dense output."
             )
-        if times.size and not (times.min() >= self.t[0] and times.max() <= self.t[-1]):
+        inside = arguments.within(times, self.t[0], self.t[-1])
+        if inside is None:
             raise ArgumentError(
                 f"t must lie in the run, [{self.t[0]}, {self.t[-1]}]; got {times.min()} to {times.max()}."
             )
-        flat = times.ravel()
+        flat = inside.ravel()
         if len(self._pieces.t) == 0:
             return np.broadcast_to(self.x[-1], (*times.shape, self.system.dimension)).copy()
         states, _ = self._pieces.at(flat)
