@@ -166,7 +166,7 @@ class Case:
         >>> import models
         >>> ball = models.bouncing_ball()
         >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.3)
-        >>> float(case.named(case.run.arc.x[0]).q)
+        >>> round(float(case.named(case.run.arc.x[0]).q), 9)
         1.0
         """
         return named_values("state components", self.system.state_names, x)
