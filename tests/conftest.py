@@ -11,6 +11,17 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 # Tracing makes many small objects. Fewer searches for garbage among them save processor time.
 gc.set_threshold(20_000, 20, 20)
 
+pytest_plugins = ["tests.nudge"]
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--browser",
+        action="store_true",
+        help="tests in a browser fail where there is none, instead of being skipped",
+    )
+
+
 # A first example may compile a kernel, so deadlines and slowness checks are switched off.
 settings.register_profile(
     "ci",

@@ -139,6 +139,7 @@ class TestArrays:
         assert given[0] == 1.0
         refused(arguments.numbers, ["1"], "be numbers", text="size must be numbers; got ['1']")
 
+    @pytest.mark.as_given
     def test_a_time_span(self):
         assert arguments.time_span("size", (0, 2)) == (0.0, 2.0)
         assert arguments.time_span("size", [1.0, 1.0]) == (1.0, 1.0)
@@ -149,10 +150,16 @@ class TestArrays:
         told = "size must not run backwards; got (2.0, 1.0). Write (1.0, 2.0)"
         refused(arguments.time_span, (2.0, 1.0), text=told)
 
+    @pytest.mark.as_given
     def test_increasing_times(self):
         for value in ([], [1.0], [1.0, 1.0, 2.0], [0.0, 3.0]):
             found = arguments.increasing_times("size", value, 0.0, 3.0)
             np.testing.assert_array_equal(found, value)
+        # Sums of 0.1 may end a last bit before or beyond the end that they mean.
+        computed = np.cumsum([0.1] * 30)
+        assert computed[-1] != 3.0
+        found = arguments.increasing_times("size", computed, 0.1, 3.0)
+        assert (found[0], found[-1]) == (0.1, min(computed[-1], 3.0))
         for value, text in (
             ("12", "size must be increasing times of shape (N,); got '12'"),
             ([[1.0]], "size must be increasing times of shape (N,); got shape (1, 1)."),

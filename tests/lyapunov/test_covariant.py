@@ -44,13 +44,16 @@ def test_the_angle_between_two_planes_is_the_smallest_between_their_directions(a
 
     def image(t, x, p):
         return tuple(
-            sum(float(each) * getattr(x, name) for each, name in zip(row, names, strict=True)) for row in matrix
+            sum(float(each) * getattr(x, name) for each, name in zip(row, names, strict=True))
+            for row in matrix
         )
 
     found = lyapunov.covariant_vectors(
         clocked(names, image), (0.0, 0.0, 0.0, 0.0, 0.5), interval=1.0, intervals=20, transient=200
     )
-    np.testing.assert_allclose(found.exponents, [np.log(3), np.log(2), 0.0, np.log(0.5), np.log(0.4)], atol=1e-9)
+    np.testing.assert_allclose(
+        found.exponents, [np.log(3), np.log(2), 0.0, np.log(0.5), np.log(0.4)], atol=1e-9
+    )
     np.testing.assert_allclose(found.angles, min(a, b), rtol=1e-9)
 
 

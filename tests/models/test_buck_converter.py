@@ -49,7 +49,7 @@ def test_orbit(converter):
     v, i = converter["x0"]
     given = {"mode": "off", "parameters": {"E": converter["E"]}}
     orbit = hybrid.periodic_orbit(buck_converter(), (v + 1e-4, i + 1e-5, 0.0), **given)
-    assert orbit.period == T
+    assert orbit.period == pytest.approx(T, rel=1e-14)
     np.testing.assert_allclose(orbit.x0, (v, i, 0.0), atol=1e-12)
     *filter_pair, forgotten = sorted(orbit.multipliers, key=abs, reverse=True)
     assert forgotten == 0.0

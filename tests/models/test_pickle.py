@@ -37,6 +37,7 @@ def results():
     )
 
 
+@pytest.mark.as_given
 def test_results_come_back_from_a_new_process():
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         arc, orbit, spectrum = pool.apply(results)

@@ -28,7 +28,7 @@ def test_the_step_response(limit):
     assert len(arc.jumps) == 50
     exact = samples(0.0, 0.0, 0.0, 50, {**P, "u_max": limit})
     np.testing.assert_allclose(arc.jumps.x_plus, exact, atol=1e-12)
-    assert (np.abs(arc["u"]).max() == limit) == (limit < 100.0)
+    assert (np.abs(arc["u"]).max() == arc.parameters["u_max"]) == (limit < 100.0)
 
 
 def test_the_multipliers():
@@ -44,7 +44,7 @@ def test_the_multipliers():
 
 def test_saturation_ends_a_deviation_of_the_control():
     arc = hybrid.simulate(sampled_loop(), {"y": 0.0, "u": 1.5}, (0.0, T), tangent=True)
-    assert arc["u"][-1] == P["u_max"]
+    assert arc["u"][-1] == arc.parameters["u_max"]
     np.testing.assert_allclose(arc.fundamental[1], 0.0)
 
 
@@ -52,6 +52,6 @@ def test_it_does_not_wind_up():
     """After a long time at the limit the control leaves it at the first sample that asks for less."""
     far = {"r": 3.0}
     held = hybrid.simulate(sampled_loop(), {"y": 0.0}, (0.0, 20.0), parameters=far)
-    assert held["u"][-1] == P["u_max"]
+    assert held["u"][-1] == held.parameters["u_max"]
     back = hybrid.simulate(sampled_loop(), held.x[-1], (20.0, 20.25))
-    assert back["u"][-1] < P["u_max"]
+    assert back["u"][-1] < 0.999 * P["u_max"]

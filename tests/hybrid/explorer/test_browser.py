@@ -1,4 +1,4 @@
-"""The page in a browser without a display, if Chromium and its driver are installed."""
+"""The page in a browser without a display."""
 
 import os
 import shutil
@@ -17,10 +17,7 @@ import models
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 DRIVER = shutil.which("chromedriver")
-pytestmark = pytest.mark.skipif(
-    not (CHROMIUM and DRIVER),
-    reason="Chromium and chromedriver are not installed (Debian: apt-get install chromium chromium-driver)",
-)
+MISSING = "Chromium and chromedriver are not installed (Debian: apt-get install chromium chromium-driver)"
 
 # The page is drawn by Bokeh: its document has the figures, sliders and sources.
 TOOLS = """
@@ -38,6 +35,13 @@ const button = (text) => all(document, "button", []).find((each) => each.textCon
 const script = () => all(document, "pre", []).map((each) => each.textContent)
     .find((each) => each.startsWith("import hybrid"));
 """
+
+
+@pytest.fixture(scope="module", autouse=True)
+def installed(request):
+    """Without a browser the tests are skipped, or fail where ``--browser`` asks for them."""
+    if not (CHROMIUM and DRIVER):
+        (pytest.fail if request.config.getoption("browser") else pytest.skip)(MISSING)
 
 
 @pytest.fixture(scope="module")

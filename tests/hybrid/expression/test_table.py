@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from scipy.interpolate import CubicSpline, PPoly, PchipInterpolator, make_interp_spline
+from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly, make_interp_spline
 
 from hybrid import (
     DOP853,

@@ -16,7 +16,7 @@ def opaque(t, x, p):
 def test_an_orbit_says_that_crossings_on_it_are_not_proved():
     system = HybridSystem(
         state=("q", "v"),
-        parameters={"n": 1.0},
+        parameters={"n": 1.5},
         modes=[Mode("m", lambda t, x, p: (x.v, np.cos(t) - 0.1 * x.v - x.q**3))],
         transitions=[Transition("m", "m", Guard(opaque, -1), name="top")],
         period=2 * np.pi,

@@ -39,7 +39,7 @@ class TestForced:
         orbit = periodic_orbit(OSCILLATOR, guess, t0=t0)
         assert orbit.status.ok
         np.testing.assert_allclose(in_order(orbit.multipliers), exact, atol=1e-8)
-        assert orbit.period == 2 * math.pi
+        assert orbit.period == pytest.approx(2 * math.pi, rel=1e-14)
         assert orbit.t0 == t0
 
     def test_unstable_orbit(self):
@@ -64,7 +64,7 @@ class TestForced:
     def test_arc_closes(self):
         orbit = periodic_orbit(OSCILLATOR, (0.9, 1.0), t0=0.4)
         arc = orbit.arc()
-        assert (arc.t[0], arc.t[-1]) == (0.4, 0.4 + orbit.period)
+        assert (arc.t[0], arc.t[-1]) == pytest.approx((0.4, 0.4 + orbit.period), rel=1e-14)
         np.testing.assert_allclose(arc.x[-1], arc.x[0], atol=1e-8)
 
 

@@ -79,7 +79,7 @@ def test_labels_are_at_the_left_and_below_the_last_row(turns):
     assert [ax.get_ylabel() for ax in axes] == ["c", "s", "n"]
     assert [ax.get_xlabel() for ax in axes] == ["", "", "t"]
     assert [ax.get_legend() is not None for ax in axes] == [True, False, False]
-    assert axes[0].get_xlim() == (0.0, 12.0)
+    assert axes[0].get_xlim() == pytest.approx((0.0, 12.0), rel=1e-14)
 
 
 def test_visits_of_the_second_mode_are_shaded(turns):
@@ -101,7 +101,7 @@ def test_a_portrait_has_points_between_the_steps(turns):
         # No part bends away from its chord by more than a thousandth of the extent.
         steps = np.hypot(np.diff(s), np.diff(c))
         assert steps[steps < 0.5].max() < 2 * np.arccos(1 - 2.1e-3)
-    np.testing.assert_array_equal(start.get_xydata(), [[0.0, 1.0]])
+    np.testing.assert_allclose(start.get_xydata(), [[0.0, 1.0]], rtol=1e-14)
     assert len(jumps.get_xydata()) == 3 * len(turns.jumps)
 
 

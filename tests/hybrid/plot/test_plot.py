@@ -131,7 +131,7 @@ def test_an_orbit_is_drawn_over_the_components_asked_for(options, components):
     orbit = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
     axes = hybrid.plot.plot_orbit(orbit, **options)
     *_, start = curves(axes)
-    np.testing.assert_array_equal(start, [orbit.x0[[*components]]])
+    np.testing.assert_allclose(start, [orbit.x0[[*components]]], rtol=1e-14)
     names = orbit.system.state_names
     assert (axes.get_xlabel(), axes.get_ylabel()) == tuple(names[i] for i in components)
     assert axes.get_title(loc="left") == (f"period 6.28319, largest multiplier {orbit.multipliers[0]:.4g}")
@@ -143,7 +143,7 @@ def test_an_orbit_of_one_component_is_drawn_over_itself():
     )
     orbit = hybrid.periodic_orbit(line, (0.5,))
     axes = plot(orbit)
-    np.testing.assert_array_equal(curves(axes)[-1], [[orbit.x0[0]] * 2])
+    np.testing.assert_allclose(curves(axes)[-1], [[orbit.x0[0]] * 2], rtol=1e-14)
     assert "largest multiplier 0.001867" in axes.get_title(loc="left")
 
 

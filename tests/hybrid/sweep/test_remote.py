@@ -48,6 +48,7 @@ def test_processes_give_what_threads_give(pool):
     assert same(sweep(task, over, executor=pool), sweep(task, over))
 
 
+@pytest.mark.as_given
 @pytest.mark.parametrize("continue_from", [None, "A"])
 def test_charts_travel_with_their_models(pool, continue_from, tmp_path):
     """Fields and guards of this model are functions without a name that could be imported."""

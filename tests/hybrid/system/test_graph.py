@@ -122,6 +122,7 @@ def test_functions_need_not_be_hashable():
     assert hybrid.split(system).mode_names == ("a",)
 
 
+@pytest.mark.as_given
 def test_periods():
     assert ball().forcing_period() is None
     assert ball(period=2.5).forcing_period() == 2.5
@@ -174,6 +175,7 @@ def test_numbered_state():
     assert HybridSystem(state=np.int64(3), modes=[Mode("a", lambda t, x, p: -x)]).dimension == 3
 
 
+@pytest.mark.as_given
 def test_parameters():
     system = ball()
     np.testing.assert_array_equal(system.parameter_values(), [9.81, 0.8])

@@ -138,6 +138,7 @@ class TestNamesAndNumbers:
         with pytest.raises(ArgumentError, match="HybridSystem: parameter 'k' must be a number; got '1'"):
             as_parameters({"k": "1"})
 
+    @pytest.mark.as_given
     def test_values_of_parameters(self):
         variables = Variables(("q",), {"k": 2.0, "m": 3.0})
         assert variables.parameter_values().tolist() == [2.0, 3.0]

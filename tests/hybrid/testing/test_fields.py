@@ -69,7 +69,7 @@ class TestRuns:
         if np.abs(field.heights(np.array(x0))).min() < 1e-12:
             return
         arc = simulate(from_equations(field, state=2), x0, (0.0, 2.0), solver=TIGHT)
-        assert arc.t[-1] == 2.0
+        assert arc.status.ok
         np.testing.assert_allclose([arc(t) for t in samples], reference.states, atol=1e-9)
 
 

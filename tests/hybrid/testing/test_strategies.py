@@ -112,6 +112,7 @@ def test_ranges_are_checked(wrong):
         _values("q", wrong)
 
 
+@pytest.mark.as_given
 @pytest.mark.parametrize("wrong", [(1.0, 1.0), (2.0, 1.0)])
 def test_spans_are_checked(wrong):
     assert _time_span((1, 2.5)) == (1.0, 2.5)

@@ -52,6 +52,7 @@ def by_name(items):
     return {each.name: each for each in items}
 
 
+@pytest.mark.as_given
 class TestAltered:
     VARIANT = altered(SYSTEM)
 

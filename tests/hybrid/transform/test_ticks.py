@@ -65,7 +65,8 @@ def test_a_duty_at_its_limits_or_beyond(d):
 def test_ticks_are_exact(period):
     system = pulsed(DUTIES["remainder of t by T"], period=period)
     arc = simulate(system, (0.0,), (0.0, 0.3 * 1000.5))
-    T, on = Fraction(0.3), Fraction(0.4 * 0.3)
+    T, d = arc.parameters["T"], arc.parameters["d"]
+    T, on = Fraction(T), Fraction(d * T)
     exact = sorted([float(k * T) for k in range(1, 1001)] + [float(k * T + on) for k in range(1001)])
     found = arc.jumps.t
     np.testing.assert_allclose(found, exact[: len(found)], rtol=0 if period is None else 3e-16)

@@ -29,6 +29,7 @@ def package(compiled, tmp_path, monkeypatch):
         (folder / path.name).write_bytes(path.read_bytes())
     monkeypatch.setattr(shipped, "FOLDER", folder)
     monkeypatch.setenv("HYBRID_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.delenv("HYBRID_CPU", raising=False)
     # What was decided for the real processor and the real folder is not used.
     shipped._runs_here.cache_clear()
     yield folder

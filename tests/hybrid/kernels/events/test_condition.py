@@ -263,7 +263,7 @@ class TestEndOfTheRun:
 
     def test_samples_stop_there(self):
         arc = simulate(self.SYSTEM, self.START, (0.0, 10.0), samples=np.arange(11.0))
-        np.testing.assert_array_equal(arc.t, [0.0, 1.0, 2.0])
+        np.testing.assert_allclose(arc.t, [0.0, 1.0, 2.0], rtol=1e-14)
 
     def test_a_start_beyond_does_not_end_there(self):
         """``-1 + 3 t - t^2`` meets ``t / 2`` from below first, and then from above."""

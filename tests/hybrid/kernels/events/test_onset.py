@@ -108,6 +108,7 @@ def cut(name):
     return *case, [simulate(system, x0, (0.0, end), mode=mode, solver=solver).jumps.t for solver in SOLVERS]
 
 
+@pytest.mark.as_given
 @pytest.mark.parametrize("solver", [0, 1], ids=["Taylor", "DOP853"])
 @pytest.mark.parametrize("name", ["ball", "oscillator", *GUARDS, *(f"{guard}, both" for guard in GUARDS)])
 def test_a_run_cut_beside_a_jump(solver, name):

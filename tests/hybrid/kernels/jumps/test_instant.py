@@ -121,6 +121,7 @@ def reference(name, values, start):
     return Reference(velocities, transitions, start, "A", END)
 
 
+@pytest.mark.as_given
 @pytest.mark.parametrize("name", STRUCTURES)
 def test_random_systems_beside_a_slow_reference(name):
     rng = np.random.default_rng(20)

@@ -100,9 +100,9 @@ def driven(name):
     solver=st.sampled_from([*SOLVERS, Taylor(rtol=1e-5, atol=1e-6), DOP853(rtol=1e-5, atol=1e-6)]),
 )
 def test_a_smooth_field_is_not_slowed_down(name, frequency, solver):
-    """Not by a twentieth of the steps, slow or fast."""
+    """Not by a tenth of the steps, slow or fast."""
     span, options = (0.0, min(50.0, 200.0 / frequency)), {"parameters": {"w": frequency}, "solver": solver}
     bounded, free = (simulate(system, (0.5, 0.0), span, **options) for system in driven(name))
     assert bounded.status.ok
-    assert bounded.steps + bounded.rejected <= 1.05 * (free.steps + free.rejected) + 2
+    assert bounded.steps + bounded.rejected <= 1.1 * (free.steps + free.rejected) + 2
     np.testing.assert_allclose(bounded.x[-1], free.x[-1], atol=1e4 * solver.rtol)
