@@ -24,32 +24,29 @@ towards = 0.0
 
 
 def pytest_addoption(parser):
-    parser.addoption(
-        "--nudge",
-        nargs="?",
-        const="one way",
-        choices=["one way", "other way"],
-        help="move all numbers of runs by one unit in the last place, one way or the other for each test",
-    )
+    told = "move all numbers of runs by one unit in the last place, up in some tests and down in others"
+    parser.addoption("--nudge", action="store_true", help=told)
+    parser.addoption("--nudge-back", action="store_true", help="the same the other way in each test")
 
 
 def pytest_configure(config):
-    if config.getoption("nudge"):
+    back = config.getoption("nudge_back")
+    if back or config.getoption("nudge"):
         _install()
-        config.pluginmanager.register(_Direction(config.getoption("nudge") == "other way"))
+        config.pluginmanager.register(_Direction(back))
 
 
 class _Direction:
     """Each test, with the fixtures that it makes, has one direction."""
 
-    def __init__(self, other_way):
-        self.other_way = other_way
+    def __init__(self, back):
+        self.back = back
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item):
         global towards
         if item.get_closest_marker("as_given") is None:
-            towards = np.inf if zlib.crc32(item.name.encode()) % 2 != self.other_way else -np.inf
+            towards = np.inf if zlib.crc32(item.name.encode()) % 2 != self.back else -np.inf
         try:
             return (yield)
         finally:
