@@ -95,7 +95,7 @@ def peers() -> list[Any]:
 
 
 def ours(case: Case) -> dict[str, Method]:
-    (vector,) = first_vectors(case.system, 1).T
+    (vector,) = first_vectors(case.system, 1, None).T
 
     def with_solver(kind: Callable[..., Any]) -> Method:
         def at(rtol: float) -> Callable[[], Growth]:

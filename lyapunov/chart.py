@@ -22,7 +22,14 @@ from hybrid.solvers import Solver
 from hybrid.sweep.rows import At, Place, Rows, rows_of
 from hybrid.sweep.sheet import Labels
 from hybrid.transform.aged import aged
-from lyapunov.spectrum import Estimate, Means, first_vectors, interval_length, orthonormal_at_start
+from lyapunov.spectrum import (
+    Estimate,
+    Means,
+    first_vectors,
+    interval_length,
+    number_of_exponents,
+    orthonormal_at_start,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -133,7 +140,7 @@ def chart(
     )
     task = Exponents(
         rows,
-        k=first_vectors(system, k).shape[1],
+        k=number_of_exponents(system, k),
         intervals=arguments.count("intervals", intervals, 1),
         interval=None if interval is None else arguments.positive("interval", interval, "be a positive time"),
         transient=arguments.count("transient", transient, 1 if rows.along else 0),
@@ -160,7 +167,7 @@ class Exponents:
     def _row(self, rows: Rows, point: Mapping[str, float], place: Place | None) -> dict[str, Any]:
         trajectory = rows.begin(point, place, self._vectors, rows.system)
         orthonormal_at_start(trajectory)
-        estimate = Estimate(trajectory, self._length(trajectory))
+        estimate = Estimate(trajectory, self._length(trajectory), self.k)
         means = estimate.run(self.transient, self.intervals, False, silent())
         found = {
             "exponents": means.exponents,
@@ -196,7 +203,7 @@ class Exponents:
     def prepare(self) -> None:
         """Load what the rows need."""
         load_kernels("lyapunov.kernels")
-        self.rows.prepare(self.k)
+        self.rows.prepare(self._vectors.shape[1])
 
     @property
     def along(self) -> str | None:
@@ -226,7 +233,7 @@ class Exponents:
 
     @cached_property
     def _vectors(self) -> np.ndarray:
-        return first_vectors(self.rows.system, self.k)
+        return first_vectors(self.rows.system, self.k, self.rows.solver)
 
     def _length(self, trajectory: Trajectory) -> float:
         return interval_length(trajectory, self.interval, self.transient + self.intervals)

@@ -28,6 +28,7 @@ from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.pace import time_scale
 from hybrid.simulation.periods import check_time
+from hybrid.simulation.plan import check_solver
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.growth import growing
@@ -61,7 +62,8 @@ class LyapunovSpectrum:
     sum_rule
         Required sum of the exponents if ``k = n``: the time average of div f plus the mean log-determinant
         of the saltation matrices per unit time, along the same orbit and with the same weights. nan where
-        some modes have an `hybrid.After` and others have none: entries forget the age.
+        nothing is left to compare: where some modes have an `hybrid.After` and others have none, since
+        entries forget the age, and where the last exponent is taken from this sum, with an implicit solver.
     growths
         ``(intervals, k)``: growth rate of each direction over each interval; empty with ``history=False``.
     interval, intervals
@@ -201,6 +203,10 @@ def lyapunov_spectrum(
     jump (Mueller 1995). The error control includes the vectors. They are orthonormalised at the end of each
     interval, and around jumps whose saltation matrices nearly annihilate a direction.
 
+    An implicit solver carries no vector along the last of all ``n`` directions. In a stiff mode that vector
+    shrinks at the fast rate, and steps would have to follow it. Its exponent is what the others leave of the
+    sum rule.
+
     Parameters
     ----------
     system, x0, mode, parameters, solver
@@ -244,7 +250,8 @@ def lyapunov_spectrum(
     >>> bool(abs(spectrum.sum_defect) < 1e-9)
     True
     """
-    vectors = first_vectors(system, k)
+    k = number_of_exponents(system, k)
+    vectors = first_vectors(system, k, solver)
     intervals = arguments.count("intervals", intervals, 1)
     transient = arguments.count("transient", transient, 0)
     history, progress = arguments.flag("history", history), arguments.flag("progress", progress)
@@ -253,15 +260,20 @@ def lyapunov_spectrum(
     length = interval_length(trajectory, interval, transient + intervals)
     load_kernels("lyapunov.kernels")
     with trajectory.stop, progress_bar(transient + intervals, "Lyapunov spectrum", progress) as bar:
-        return Estimate(trajectory, length).spectrum(transient, intervals, history, bar)
+        return Estimate(trajectory, length, k).spectrum(transient, intervals, history, bar)
 
 
-def first_vectors(system: HybridSystem, k: int | None) -> np.ndarray:
-    """Tangent vectors ``(n, k)`` to start with, with the age last; None for as many as all modes have."""
-    system = compile_system(system).system
-    most = least_dimension(system)
-    directions = most if k is None else arguments.count("k", k, 1, most, ", the dimension of the state")
-    return generic_directions(aged(system).tangent_dimension, directions)
+def number_of_exponents(system: HybridSystem, k: int | None) -> int:
+    """How many exponents are asked for; None for as many as all modes have."""
+    most = least_dimension(compile_system(system).system)
+    return most if k is None else arguments.count("k", k, 1, most, ", the dimension of the state")
+
+
+def first_vectors(system: HybridSystem, k: int, solver: Solver | None) -> np.ndarray:
+    """Tangent vectors to start with for ``k`` exponents, as columns, with the age last."""
+    n = aged(compile_system(system).system).tangent_dimension
+    by_sum_rule = 1 < k == n and check_solver(solver).tableau.implicit
+    return generic_directions(n, k - by_sum_rule)
 
 
 def orthonormal_at_start(trajectory: Trajectory) -> None:
@@ -328,10 +340,13 @@ class Means(NamedTuple):
 
 
 class Estimate:
-    """Advances a trajectory and accumulates the growth rates, which the kernel returns in bursts."""
+    """Advances a trajectory and accumulates the growth rates, which the kernel returns in bursts.
 
-    def __init__(self, trajectory: Trajectory, interval: float) -> None:
-        self.trajectory = trajectory
+    The trajectory carries a vector for each of the ``k`` exponents, or for all but the last of ``k = n``.
+    """
+
+    def __init__(self, trajectory: Trajectory, interval: float, k: int) -> None:
+        self.trajectory, self.k = trajectory, k
         self.interval = interval
         self.end = end_at(trajectory.run)
         self.task = trajectory.task(trajectory.no_record(), orthonormal=True)
@@ -358,12 +373,12 @@ class Estimate:
             **found,
             interval=self.interval,
             names=Names(system.state_names, dict(system.units)),
-            jump_rates=JumpRates.of(system, self.trajectory.tangents, values, batches),
+            jump_rates=JumpRates.of(system, self.k, values, batches),
         )
 
     def run(self, transient: int, intervals: int, history: bool, bar: Progress) -> Means:
         """What is found over ``intervals`` intervals, after ``transient`` intervals."""
-        trajectory, k = self.trajectory, self.trajectory.tangents
+        trajectory, k = self.trajectory, self.k
         system, code = trajectory.system, codes.DONE
         if transient:
             _, code = self._collect(transient, None, False, bar)
@@ -377,13 +392,15 @@ class Estimate:
         growths = np.empty((0, k))
         if code == codes.DONE:
             growths, code = self._collect(intervals, mean, history, bar)
-        values, means = mean.value(), closed_batch_means(self.sums.batches, self.sums.batch_state)
+        values = self._completed(mean.value())
+        means = self._completed(closed_batch_means(self.sums.batches, self.sums.batch_state))
         error = standard_error_from_batches(means[:, :k]) * taper_inflation()
         count = max(mean.count, 1)
+        compares = k == trajectory.tangents and least_dimension(system) == system.tangent_dimension
         return Means(
             values[:k],
             error,
-            float(values[k]) if least_dimension(system) == system.tangent_dimension else math.nan,
+            float(values[k]) if compares else math.nan,
             growths,
             mean.count,
             (trajectory.run.jumps - jumps) / count,
@@ -398,9 +415,9 @@ class Estimate:
     def _collect(
         self, intervals: int, mean: TaperedMean | None, history: bool, bar: Progress
     ) -> tuple[np.ndarray, int]:
-        trajectory, total = self.trajectory, 0
-        kept = [np.empty((0, trajectory.tangents))]
-        bursts, code = Bursts([trajectory]), codes.DONE
+        total = 0
+        kept = [np.empty((0, self.k))]
+        bursts, code = Bursts([self.trajectory]), codes.DONE
         while total < intervals and code == codes.DONE:
             # Add whole blocks to the mean, so that its rounding does not depend on where bursts end.
             rates = np.empty((min(INTERVALS_AT_ONCE, intervals - total), self.columns))
@@ -416,8 +433,18 @@ class Estimate:
             if mean is not None:
                 mean.add(rates[:filled])
             if history:
-                kept.append(rates[:filled, : trajectory.tangents])
+                kept.append(self._completed(rates[:filled])[:, : self.k])
         return np.concatenate(kept) if history else kept[0], code
+
+    def _completed(self, rates: np.ndarray) -> np.ndarray:
+        """Rates ``(..., columns)`` with the last growth: if it was not carried, the others leave it of the sum."""
+        carried = self.trajectory.tangents
+        if self.k == carried:
+            return rates
+        total = rates[..., carried]
+        with np.errstate(invalid="ignore"):
+            last = np.where(total == -np.inf, total, total - rates[..., :carried].sum(axis=-1))
+        return np.insert(rates, carried, last, axis=-1)
 
     def _rates(self, most: int, resumed: bool, rates: np.ndarray) -> int:
         """One burst of the kernel: growth rates over the next intervals, in the rows of ``rates``."""
