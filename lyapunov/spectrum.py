@@ -437,7 +437,7 @@ class Estimate:
         return np.concatenate(kept) if history else kept[0], code
 
     def _completed(self, rates: np.ndarray) -> np.ndarray:
-        """Rates ``(..., columns)`` with the last growth: if it was not carried, the others leave it of the sum."""
+        """Rates ``(..., columns)`` with the last growth: what the others leave of the sum, if not carried."""
         carried = self.trajectory.tangents
         if self.k == carried:
             return rates

@@ -194,6 +194,7 @@ class TestSamples:
         np.testing.assert_array_equal(arc.j, np.arange(1, len(times) + 1))
         np.testing.assert_array_equal(arc.jumps.t, times)
 
+    @pytest.mark.as_given
     def test_at_an_event_that_ends_the_run(self, ride):
         for jump in ride.jumps[:4]:
             arc = simulate(OSCILLATOR, (0.0, 0.0), (0.0, jump.t), samples=[jump.t], solver=TIGHT)
