@@ -22,6 +22,9 @@ from hybrid.kernels.types.codes import AFTER, AT, EVERY, NO_MODE, NO_TRANSITION
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
+# Relative rounding of a time that a user computes, and of the number that it is compared with.
+ROUNDED = 2 * EPSILON
+
 
 @njit(**IN_ORDER)
 def place_of_tick(model, run, transition, k):
@@ -54,14 +57,17 @@ def time_to_tick(model, run, transition, k):
 
 @njit(**KERNEL)
 def rounding_of_tick(model, run, transition, k):
-    """How far the rounding of its numbers may move a tick: ticks within it of each other are one instant."""
+    """How far the rounding of its numbers may move a tick: ticks within it of each other are one instant.
+
+    A number that is computed is a last bit away from the one that is meant, on either side.
+    """
     kind, first = model.clock[transition], model.first_tick[transition]
     if kind == EVERY:
-        return EPSILON * (abs(k * run.ticks[first]) + abs(run.ticks[first + 1]))
+        return ROUNDED * (abs(k * run.ticks[first]) + abs(run.ticks[first + 1]))
     if kind == AT:
-        return EPSILON * abs(run.ticks[first + min(k, model.first_tick[transition + 1] - first - 1)])
+        return ROUNDED * abs(run.ticks[first + min(k, model.first_tick[transition + 1] - first - 1)])
     entry = run.entry_cycle * model.period + run.entry_phase
-    return EPSILON * (abs(entry) + run.ticks[first])
+    return ROUNDED * (abs(entry) + run.ticks[first])
 
 
 @njit(**KERNEL)
