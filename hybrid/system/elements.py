@@ -60,7 +60,8 @@ class Guard(Portable):
         and on entry to the mode if the state is already on or beyond the guard. It need not be continuous.
     at_start
         If True, crossings are not searched for: the transition fires only if a run starts in the mode with
-        the state beyond the guard by more than rounding. ``direction`` says which side is beyond.
+        the state beyond the guard by more than rounding. ``direction`` says which side is beyond. Of several
+        that a start lies beyond, each fires, in listed order, while the run stays in the mode.
 
     Raises
     ------

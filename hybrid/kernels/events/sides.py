@@ -308,9 +308,19 @@ def take_sides(model, run, mode, t, x, arrival, known_sides, work):
 
 
 @njit(**KERNEL)
-def beyond_at_start(model, run, mode, t, x, work):
-    """A transition that fires only at the start of a run, if ``x (n,)`` lies beyond its guard; else none."""
-    for slot in range(model.first_at_start[mode], model.first_at_start[mode + 1]):
+def listed_behind(model, mode, fired):
+    """The slot behind a transition among those that fire only at a start here; behind all for others."""
+    last = model.first_at_start[mode + 1]
+    for slot in range(model.first_at_start[mode], last):
+        if model.at_start[slot] == fired:
+            return slot + 1
+    return last
+
+
+@njit(**KERNEL)
+def beyond_at_start(model, run, mode, t, x, first, work):
+    """The first transition from a slot on that fires only at a start beyond its guard, if ``x (n,)`` is."""
+    for slot in range(first, model.first_at_start[mode + 1]):
         transition = model.at_start[slot]
         value = guard_value(model, transition, t, x, work.scalar)
         model.guard_gradient(transition, t, x, model.parameters, work.gradient)
@@ -331,7 +341,7 @@ def mode_of_limit(model, run, transition, t, x, work):
     mode = model.accumulates_to[transition]
     if mode == NO_MODE:
         return run.mode, NO_TRANSITION
-    onward = beyond_at_start(model, run, mode, t, x, work)
+    onward = beyond_at_start(model, run, mode, t, x, model.first_at_start[mode], work)
     for _ in range(model.first_at_start.shape[0]):
         if onward == NO_TRANSITION or model.target[onward] == NO_MODE:
             break
@@ -342,7 +352,7 @@ def mode_of_limit(model, run, transition, t, x, work):
         if not keeps:
             break
         mode = model.target[onward]
-        onward = beyond_at_start(model, run, mode, t, x, work)
+        onward = beyond_at_start(model, run, mode, t, x, model.first_at_start[mode], work)
     return mode, onward
 
 

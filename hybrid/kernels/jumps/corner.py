@@ -23,6 +23,7 @@ from hybrid.kernels.events.sides import (
     Sides,
     beyond_at_start,
     end_instant,
+    listed_behind,
     order_passed,
     side_here,
     sides_of,
@@ -57,7 +58,11 @@ def enter(model, run, work):
     came = STARTED if left == NO_MODE else LANDED
     fired = run.last_fired if run.jumps > 0 else NO_TRANSITION
     fires = take_sides(model, run, mode, t, run.y, Arrival(came, left, fired), sides_of(run), work)
-    excluded = beyond_at_start(model, run, mode, t, run.y, work) if came == STARTED else NO_TRANSITION
+    # Each of those that the start lies beyond fires, in listed order, while the run stays in the mode.
+    first = model.first_at_start[mode] if came == STARTED else model.first_at_start[mode + 1]
+    if left == mode:
+        first = listed_behind(model, mode, run.last_fired)
+    excluded = beyond_at_start(model, run, mode, t, run.y, first, work)
     if excluded != NO_TRANSITION:
         run.locked = 1
         return excluded
