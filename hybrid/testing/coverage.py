@@ -21,6 +21,7 @@ from hybrid.system.watched import is_of_library
 from hybrid.testing.case import MOST_OF_WHOLE, Case, lasting
 from hybrid.testing.errors import PropertyError
 from hybrid.testing.starts import nearest_zero, start_in
+from hybrid.testing.symmetry import is_mirrored
 
 FIRES = "Every guard can fire, and no condition refuses every crossing"
 # States are also drawn from the ranges times powers of ten between these.
@@ -166,14 +167,19 @@ class Coverage:
     def check(self) -> None:
         """Fail if the guard of a transition that no run took has one sign, or its condition allows nothing.
 
+        The mirror image of a transition that was taken is right where that one is.
+
         Raises
         ------
         PropertyError
             If there is no place on the guard, among many states in the ranges and far beyond, where the
             transition could fire.
         """
+        taken = [each for each in self.system.transitions if self.jumps[each.name]]
         for transition in self.system.transitions:
-            if not self.jumps[transition.name] and not transition.guard.at_start and _is_users(transition):
+            if self.jumps[transition.name] or transition.guard.at_start or not _is_users(transition):
+                continue
+            if not is_mirrored(transition, taken, self.cases):
                 self._check_guard(transition)
 
     def _check_guard(self, transition: Transition) -> None:

@@ -177,3 +177,54 @@ def test_a_mode_that_never_lasts():
     report = check_system(charger, states={"u": (0.1, 1.0)}, mode="off", t_span=(0.0, 4.0), examples=5)
     assert "- NEVER LASTS: each of " in str(report)
     assert "left mode 'charge' at the instant at which it entered" in str(report)
+
+
+def block_on_a_belt(forward_guard=lambda t, x, p: p.k * x.x + p.c * p.v0 + p.F):
+    """The belt runs to the right, and a spring pulls back: no block at rest on the belt overtakes it."""
+    slips = [
+        Transition(
+            "stick", "back", Guard(lambda t, x, p: p.k * x.x + p.c * p.v0 - p.F, +1), name="slip back"
+        ),
+        Transition("stick", "forward", Guard(forward_guard, -1), name="slip forward"),
+        Transition(
+            "back", "stick", Guard(lambda t, x, p: x.v - p.v0, +1), Reset(lambda t, x, p: {"v": p.v0})
+        ),
+        Transition(
+            "forward", "stick", Guard(lambda t, x, p: x.v - p.v0, -1), Reset(lambda t, x, p: {"v": p.v0})
+        ),
+    ]
+    slide = lambda sign: lambda t, x, p: (x.v, -p.k * x.x - p.c * x.v + sign * 0.6 * p.F)  # noqa: E731
+    modes = [
+        Mode("stick", lambda t, x, p: (p.v0, 0.0)),
+        Mode("back", slide(+1)),
+        Mode("forward", slide(-1)),
+    ]
+    return HybridSystem(
+        state=("x", "v"),
+        parameters={"k": 1.0, "c": 0.1, "v0": 0.5, "F": 1.0},
+        modes=modes,
+        transitions=slips,
+        start="stick",
+        name="block on a belt",
+    )
+
+
+BELT = {
+    "parameters": {"v0": (0.2, 1.0)},
+    "states": {"x": (-0.5, 0.5), "v": (-0.5, 0.5)},
+    "t_span": (0.0, 20.0),
+    "examples": 10,
+}
+
+
+def test_the_other_side_of_a_symmetric_model_is_told_and_not_raised():
+    report = check_system(block_on_a_belt(), **BELT)
+    assert "slip forward" in report.never_seen
+    assert report.jumps["slip back"] > 0
+    assert "slip forward" in str(report)
+
+
+def test_a_wrong_sign_on_the_other_side_of_a_symmetric_model_is_raised():
+    faulty = block_on_a_belt(lambda t, x, p: p.k * x.x - p.c * p.v0 + p.F)
+    with pytest.raises(PropertyError, match="guard of 'slip forward' rises at all"):
+        check_system(faulty, **BELT)

@@ -75,6 +75,13 @@ class TestElastic:
     def test_it_runs_back_from_either_mode(self, t1):
         check_elastic(Case(self.floor(0.0), {}, "above", (0.5, 0.0), 0.0, t1), ["v"])
 
+    # A ball thrown up from the floor with speed 1 is back after 2, and one more jump undoes the start.
+    @pytest.mark.parametrize("t1", [0.7, 3.0, 5.2])
+    @pytest.mark.parametrize("gravity", [1.0, 0.7, 1 / 3])
+    def test_a_start_on_a_guard_is_reached_before_the_jump_there(self, t1, gravity):
+        ball = bouncing_ball()
+        check_elastic(Case(ball, {"g": gravity, "e": 1.0}, "flight", (0.0, 1.0), 0.0, t1), ["v"])
+
     @pytest.mark.parametrize("t1", [1.2, 2.5])
     def test_it_does_not_with_damping_or_with_the_wrong_component_turned(self, t1):
         with pytest.raises(PropertyError, match="runs backwards"):
