@@ -45,15 +45,36 @@ def exact_product(a, b, c, d):
 
 
 @njit(**INLINE)
+def _are_short(a, b):
+    """Whether two numbers have 24 binary digits at most, as whole numbers up to 16 million have.
+
+    The product of two such numbers is exact.
+    """
+    return abs(a) + abs(b) < math.inf and np.float32(a) == a and np.float32(b) == b
+
+
+@njit(**INLINE)
 def product(a, b, c, d):
-    """``[a, b] * [c, d]``, rounded outwards."""
+    """``[a, b] * [c, d]``, rounded outwards; the product of whole numbers is exact."""
     low, high = exact_product(a, b, c, d)
+    if _are_short(a, b) and _are_short(c, d):
+        return low, high
     return widened(low, high, ROUNDING)
 
 
 @njit(**INLINE)
+def _lost(a, b):
+    """Rounding error of the sum of two numbers; nan if the sum is infinite."""
+    total = a + b
+    part = total - a
+    return (a - (total - part)) + (b - part)
+
+
+@njit(**INLINE)
 def added(a, b, c, d):
-    """``[a, b] + [c, d]``."""
+    """``[a, b] + [c, d]``, rounded outwards where a sum has a rounding error."""
+    if _lost(a, c) == 0.0 and _lost(b, d) == 0.0:
+        return a + c, b + d
     return widened(a + c, b + d, ROUNDING)
 
 
@@ -62,6 +83,10 @@ def quotient(a, b, c, d):
     """``[a, b] / [c, d]``; the whole line if the divisor changes sign."""
     if (c < 0.0 < d) or (c == 0.0 and d == 0.0):
         return -math.inf, math.inf
+    if a == b and c == d:
+        found = a / c
+        if _are_short(found, c) and found * c == a:
+            return found, found
     least = 1.0 / d if d != 0.0 else -math.inf
     most = 1.0 / c if c != 0.0 else math.inf
     low, high = exact_product(a, b, least, most)
