@@ -183,8 +183,13 @@ def is_held(model, run, place, transition, towards, work):
 
 @njit(**KERNEL)
 def crosses_slowly(model, run, place, transition, work):
-    """Whether the jump that led here has crossed its guard with no more speed than rounding makes."""
+    """Whether the jump that led here has crossed its guard with no more speed than rounding makes.
+
+    The speed of a guard that may jump says nothing.
+    """
     mode, t, x = place
+    if may_jump(model, run, transition, t, x, work):
+        return False
     guard_speed(model, transition, t, x, work.field, work.gradient)
     return abs(run.last_transversality) <= speed_rounding(model, run, transition, mode, t, x, work)
 
