@@ -19,6 +19,8 @@ ROUNDING = 4.5e-16
 ROUNDING_OF_CUBE_ROOT = 2e-14
 HUGE = 1.7976931348623157e308
 PI = math.pi
+# The slope of the error function at zero.
+SLOPE_OF_ERF = 2.0 / math.sqrt(math.pi)
 # The sine of an argument beyond this has no digits left.
 FAR = 1e14
 
@@ -280,6 +282,12 @@ def range_of_rare(code, low, high):
         return np.ceil(low), np.ceil(high)
     if code == op.TRUNCATE:
         return np.trunc(low), np.trunc(high)
+    if code == op.ROUND:
+        return np.rint(low), np.rint(high)
+    if code == op.ERF:
+        return widened(math.erf(low), math.erf(high), 2.0 * ROUNDING)
+    if code == op.ERFC:
+        return widened(math.erfc(high), math.erfc(low), 16.0 * ROUNDING)
     if code == op.SIGN:
         return float((low > 0.0) - (low < 0.0)), float((high > 0.0) - (high < 0.0))
     if code == op.STEP:
@@ -360,6 +368,10 @@ def slope_of_rare(code, low, high, least, most):
     if op.FLOOR <= code <= op.STEP:
         return 0.0, 0.0 if least == most else math.inf
     below, above = whole_power(low, high, 2)
+    if code == op.ERF or code == op.ERFC:
+        below, above = range_of(op.EXP, -above, -below)
+        below, above = product(below, above, SLOPE_OF_ERF, SLOPE_OF_ERF)
+        return (below, above) if code == op.ERF else (-above, -below)
     if code == op.ACOSH:
         return quotient(1.0, 1.0, math.sqrt(max(below - 1.0, 0.0)), math.sqrt(max(above - 1.0, 0.0)))
     below, above = max(1.0 - above, 0.0), max(1.0 - below, 0.0)
