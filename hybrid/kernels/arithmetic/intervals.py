@@ -19,6 +19,8 @@ ROUNDING = 4.5e-16
 ROUNDING_OF_CUBE_ROOT = 2e-14
 HUGE = 1.7976931348623157e308
 PI = math.pi
+# Sums of multiples of 1 / GRID up to this size have 53 binary digits at most.
+GRID, LARGEST_ON_GRID = 2.0**20, 2.0**31
 # The slope of the error function at zero.
 SLOPE_OF_ERF = 2.0 / math.sqrt(math.pi)
 # The sine of an argument beyond this has no digits left.
@@ -65,17 +67,15 @@ def product(a, b, c, d):
 
 
 @njit(**INLINE)
-def _lost(a, b):
-    """Rounding error of the sum of two numbers; nan if the sum is infinite."""
-    total = a + b
-    part = total - a
-    return (a - (total - part)) + (b - part)
+def _is_on_grid(a):
+    """Whether a number is one of those, whole numbers among them, whose sums are exact."""
+    return abs(a) < LARGEST_ON_GRID and np.floor(GRID * a) == GRID * a
 
 
 @njit(**INLINE)
 def added(a, b, c, d):
-    """``[a, b] + [c, d]``, rounded outwards where a sum has a rounding error."""
-    if _lost(a, c) == 0.0 and _lost(b, d) == 0.0:
+    """``[a, b] + [c, d]``, rounded outwards; the sum of whole numbers is exact."""
+    if _is_on_grid(a) and _is_on_grid(b) and _is_on_grid(c) and _is_on_grid(d):
         return a + c, b + d
     return widened(a + c, b + d, ROUNDING)
 
