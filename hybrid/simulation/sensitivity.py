@@ -16,6 +16,7 @@ from hybrid.solvers import Solver
 from hybrid.status import apart_status
 from hybrid.system.functions import guard_function
 from hybrid.transform.aged import aged, with_age
+from hybrid.transform.counted import Counted, counted
 from hybrid.transform.extended import extended, with_parameters
 from hybrid.transform.restricted import restricted
 
@@ -33,14 +34,17 @@ class Sensitivities:
         Names of the parameters.
     components
         Those of a tangent vector ``(n,)`` that the run itself has: not the age.
+    counted
+        The extended system, with the jumps of its fields in time as events.
     arc
-        The run of the extended system.
+        The run of that system.
     jumps
         The jumps of the run itself, if they were kept.
     """
 
     names: tuple[str, ...]
     components: np.ndarray
+    counted: Counted
     arc: HybridArc
     jumps: Jumps | None
     x0: np.ndarray
@@ -65,7 +69,8 @@ class Sensitivities:
     @cached_property
     def times(self) -> np.ndarray:
         """Derivatives ``(jumps, n + m)`` of the times of jumps; nan for the limit of a chatter."""
-        jumps = self.arc.jumps if self.jumps is None else self.jumps
+        jumps = self.jumps
+        assert jumps is not None, "only the jumps of a run have times"
         found = np.full((len(jumps), self.arc.system.tangent_dimension), np.nan)
         before = np.append(self.t0, jumps.t[:-1])
         # A jump that another sets off happens at the time of that one.
@@ -108,7 +113,7 @@ class Sensitivities:
     def _time_of(self, jump: Jump, t: float, x: np.ndarray, tangents: np.ndarray) -> np.ndarray:
         """Derivatives ``(n + m,)`` of the time of a jump, from a state before it in its mode."""
         system = self.arc.system
-        alone = restricted(system, jump.source)
+        alone = restricted(system, jump.source, tuple(self.counted.events))
         run = self.simulate(
             alone, x, (t, jump.t), parameters=self.arc.parameters, solver=self.solver, tangent=tangents
         )
@@ -116,8 +121,10 @@ class Sensitivities:
         function = guard_function(system.transitions[index])
         values = system.parameter_values(self.arc.parameters)
         first, last = self._first, system.tangent_dimension
-        before = jump.x_minus if self.jumps is None else with_age(self.jumps.system, jump.x_minus)
-        place = with_parameters(system, before, self.x0[first:last])
+        assert self.jumps is not None
+        before = with_age(self.jumps.system, jump.x_minus)
+        place = with_parameters(self.counted.original, before, self.x0[first:last])
+        place = self.counted.state(jump.t, place, self.arc.parameters)
         slope = compile_system(system).derivative(function, index, jump.t, place, values)[0, :last]
         assert run.fundamental is not None
         return -(slope @ run.fundamental) / jump.transversality
@@ -137,17 +144,20 @@ def with_sensitivities(
 ) -> HybridArc:
     """The arc of a run with its derivatives, from the run of the extended system that goes the same way.
 
-    If that run has other jumps, both are right within the tolerances, and the status says so.
+    If that run has other jumps, both are right within the tolerances, and the status says so. Else the status
+    is that of the run with derivatives, if there is anything to tell of it.
     """
     whole = aged(arc.system)
-    system, n, m = extended(whole, names), whole.tangent_dimension, len(names)
+    n, m = whole.tangent_dimension, len(names)
+    parameters = {name: value for name, value in arc.parameters.items() if name not in names}
+    found = counted(extended(whole, names), m)
     own = np.arange(arc.system.tangent_dimension)
     begin = with_parameters(
-        system, with_age(arc.system, x0), np.array([arc.parameters[name] for name in names])
+        found.original, with_age(arc.system, x0), np.array([arc.parameters[name] for name in names])
     )
-    parameters = {name: value for name, value in arc.parameters.items() if name not in names}
+    begin = found.state(t_span[0], begin, parameters)
     again = simulate(
-        system,
+        found.system,
         begin,
         t_span,
         mode=mode,
@@ -157,13 +167,13 @@ def with_sensitivities(
         max_jumps=max_jumps,
     )
     jumps = arc.jumps if arc.keeps_jumps else None
-    known = Sensitivities(names, own, again, jumps, begin, mode, t_span[0], samples, solver, simulate)
+    known = Sensitivities(names, own, found, again, jumps, begin, mode, t_span[0], samples, solver, simulate)
     status = arc.status
     # How many jumps of a chatter are followed, up to its limit, is no property of the run.
-    apart = again.jump_count != arc.jump_count and "limit" not in again.jumps.kind
-    if apart or again.status.code != arc.status.code:
-        status = apart_status(arc.jump_count, again.jump_count)
-    elif status.ok and not again.status.ok:
+    others = sum(name not in found.events for name in again.jumps.transition)
+    if others != arc.jump_count and "limit" not in again.jumps.kind:
+        status = apart_status(arc.jump_count, others)
+    elif not again.status.ok:
         status = again.status
     jumps = None if jumps is None else attrs.evolve(jumps, sensitivities=known)
     return attrs.evolve(arc, jumps=jumps, sensitivities=known, status=status)
