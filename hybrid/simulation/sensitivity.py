@@ -113,7 +113,7 @@ class Sensitivities:
     def _time_of(self, jump: Jump, t: float, x: np.ndarray, tangents: np.ndarray) -> np.ndarray:
         """Derivatives ``(n + m,)`` of the time of a jump, from a state before it in its mode."""
         system = self.arc.system
-        alone = restricted(system, jump.source, tuple(self.counted.events))
+        alone = restricted(system, jump.source, self.counted.events_in(jump.source))
         run = self.simulate(
             alone, x, (t, jump.t), parameters=self.arc.parameters, solver=self.solver, tangent=tangents
         )

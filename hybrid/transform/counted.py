@@ -8,15 +8,15 @@ changes; so the field is smooth between events.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from itertools import count
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import count, pairwise
 from typing import Any
 
 import attrs
 import numpy as np
 
 from hybrid.expression.evaluation import Program, expressed, scalar
-from hybrid.expression.graph import Group, all_replaced, contains, in_order, mentions
+from hybrid.expression.graph import Group, all_replaced, in_order, mentions
 from hybrid.expression.nodes import HALF, ONE, ZERO, Expression, Symbol, add, number
 from hybrid.expression.operations import (
     Ceiling,
@@ -37,7 +37,7 @@ from hybrid.expression.pieces import Pieces
 from hybrid.expression.tabulated import Tabulated
 from hybrid.expression.tracing import TraceError, model_symbols, trace
 from hybrid.system.clocks import Clock, DerivedClock, numbers_of
-from hybrid.system.elements import Guard, Mode, Reset, Transition
+from hybrid.system.elements import Guard, Reset, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem, watched_below
 from hybrid.system.variables import STATE, named_values
@@ -51,6 +51,8 @@ IN_FLOORS: dict[type[Expression], Callable[..., Expression]] = {
     Remainder: lambda a, b: a - b * Floor(a / b),
     TruncatedRemainder: lambda a, b: a - b * Truncate(a / b),
 }
+# A piece of a table that is narrower than this share of its place is a jump.
+NARROW = 16.0 * np.finfo(float).eps
 BINARY = (Less, LessEqual, Sign, Step)
 JUMPS = (*BINARY, Floor, Tabulated, *IN_FLOORS)
 
@@ -95,6 +97,11 @@ class Counted:
     events: frozenset[str]
     counts: tuple[Count, ...]
 
+    def events_in(self, mode: str) -> tuple[str, ...]:
+        """Those of one mode."""
+        leaving = (each.name for each in self.system.transitions if each.source == mode)
+        return tuple(name for name in leaving if name in self.events)
+
     def state(self, t: float, x: np.ndarray, parameters: Mapping[str, float]) -> np.ndarray:
         """The state at which the counts of a point are right, from a state of the original."""
         symbols, p = model_symbols(len(x), len(parameters)), parameters.values()
@@ -122,7 +129,7 @@ def counted(system: HybridSystem, moved: int) -> Counted:
     if not counting.counts:
         return same
     lengths = np.cumsum([0, *map(len, fields)])
-    parts = [entries[first:last] for first, last in zip(lengths[:-1], lengths[1:], strict=True)]
+    parts = [entries[first:last] for first, last in pairwise(lengths)]
     return counting.made(parts)
 
 
@@ -137,20 +144,26 @@ class _Counting:
 
     def counted(self, entries: list[Expression]) -> list[Expression]:
         """The entries with counts in the place of jumps in time, innermost jumps first."""
-        while (node := next(filter(self._is_moved, in_order(entries)), None)) is not None:
+        while moved := [node for node in in_order(entries) if self._is_moved(node)]:
+            node = next(node for node in in_order(moved) if self._jumps_in_time(node))
             rule = IN_FLOORS.get(type(node))
             value = rule(*node.args) if rule is not None else self._count(node).value
             entries = all_replaced(entries, {node: value})
         return entries
 
     def _is_moved(self, node: Expression) -> bool:
-        if not isinstance(node, JUMPS) or isinstance(node, Level):
-            return False
+        """Whether a node jumps at times that only the moved components decide."""
         counters = [each.symbol for each in self.counts]
-        if isinstance(node, Tabulated) and (node.args[0] in counters or not node.jumps):
+        moves = mentions(node, (*self.moved, *counters)) and not mentions(node, self.others)
+        return moves and self._jumps_in_time(node)
+
+    def _jumps_in_time(self, node: Expression) -> bool:
+        counters = [each.symbol for each in self.counts]
+        if not isinstance(node, JUMPS) or isinstance(node, Level) or node.args[0] in counters:
             return False
-        timed = mentions(node, (self.symbols.t, *counters)) and mentions(node, (*self.moved, *counters))
-        return timed and not mentions(node, self.others) and not any(contains(u, JUMPS) for u in node.args)
+        return mentions(node, (self.symbols.t, *counters)) and not (
+            isinstance(node, Tabulated) and not node.jumps
+        )
 
     def _count(self, node: Expression) -> Count:
         made = self._new(node, Symbol(f"x[{self.n + len(self.counts)}]"))
@@ -167,22 +180,22 @@ class _Counting:
         if isinstance(node, Floor):
             return Count(c, node, ((u - c - 1, None), (u - c, None)), c)
         assert isinstance(node, Tabulated)
-        pieces, most = node.pieces, len(node.pieces.knots)
-        beyond = u - _item(c, [*pieces.knots, pieces.knots[-1]])
-        away = u - _item(c, [pieces.knots[0], *pieces.knots])
-        rows = pieces.derived(node.derived)
+        knots, rows = _without_narrow(node.pieces.knots, node.pieces.derived(node.derived))
+        beyond, away = (u - _item(c, each) for each in ([*knots, knots[-1]], [knots[0], *knots]))
         value = add(*(_item(c, rows[:, k]) * away**k for k in range(rows.shape[1])))
-        conditions = Less(c, number(most - 0.5)), Less(HALF, c)
-        return Count(c, node.number_of_piece, ((beyond, conditions[0]), (away, conditions[1])), value)
+        number_of_piece = Tabulated(u, Pieces(knots, rows).places())
+        conditions = Less(c, number(len(knots) - 0.5)), Less(HALF, c)
+        return Count(c, number_of_piece, ((beyond, conditions[0]), (away, conditions[1])), value)
 
     def made(self, fields: list[list[Expression]]) -> Counted:
         """The system with these fields."""
         original = self.original
-        transitions = [self._transition(each) for each in original.transitions]
-        taken = {*original.state_names, *original.parameters, *(each.name for each in transitions)}
+        taken = {*original.state_names, *original.parameters, *original.transition_names}
         free = (name for k in count(1) if (name := f"count{k}") not in taken)
         names = [next(free) for _ in self.counts]
-        events = [each for mode in original.modes for each in self._events(mode, names)]
+        own = {mode.name: self._read_by(field) for mode, field in zip(original.modes, fields, strict=True)}
+        transitions = [self._transition(each, own) for each in original.transitions]
+        events = [each for name in original.mode_names for each in self._events(name, own[name], names)]
         system = attrs.evolve(
             original,
             counters=(*original.counters, *names),
@@ -197,16 +210,26 @@ class _Counting:
         )
         return Counted(original, system, frozenset(each.name for each in events), tuple(self.counts))
 
-    def _events(self, mode: Mode, names: list[str]) -> Iterator[Transition]:
+    def _read_by(self, field: Iterable[Expression]) -> set[int]:
+        """The places of the counts that a field reads, and of those that these counts depend on."""
+        read, places = [*field], set[int]()
+        for place, each in reversed([*enumerate(self.counts)]):
+            if any(mentions(entry, (each.symbol,)) for entry in read):
+                places.add(place)
+                read += [each.now, *(height for height, _ in each.thresholds)]
+        return places
+
+    def _events(self, mode: str, own: set[int], names: list[str]) -> Iterator[Transition]:
         """The transitions that count in a mode; they lead to a part of the same mode, and enter none."""
-        for place, (each, name) in enumerate(zip(self.counts, names, strict=True)):
+        for place in sorted(own):
+            each, name = self.counts[place], names[place]
             for (height, condition), way in zip(each.thresholds, (1, -1), strict=True):
                 yield Transition(
-                    mode.name,
-                    mode.name,
+                    mode,
+                    mode,
                     Guard(scalar(height), way, when=None if condition is None else scalar(condition)),
                     Reset(expressed(self._after(place, way))),
-                    name=f"{mode.name}: {name} {'up' if way > 0 else 'down'}",
+                    name=f"{mode}: {name} {'up' if way > 0 else 'down'}",
                 )
 
     def _after(self, place: int, way: int) -> list[Expression]:
@@ -217,7 +240,14 @@ class _Counting:
                 [changed[each.symbol]] = all_replaced([each.now], changed)
         return [*self.symbols.x, *(changed.get(each.symbol, each.symbol) for each in self.counts)]
 
-    def _transition(self, transition: Transition) -> Transition:
+    def _counted_anew(self, places: Iterable[int]) -> Callable[..., Any]:
+        """The counts, of which those in some places are right at the point where a mode is entered."""
+        found: dict[Expression, Expression] = {}
+        for place in sorted(places):
+            [found[self.counts[place].symbol]] = all_replaced([self.counts[place].now], found)
+        return expressed([found.get(each.symbol, each.symbol) for each in self.counts])
+
+    def _transition(self, transition: Transition, own: Mapping[str, set[int]]) -> Transition:
         guard, reset = transition.guard, transition.reset
         when = None if guard.when is None else self._function(guard.when)
         moved: Guard | Clock
@@ -229,13 +259,18 @@ class _Counting:
             moved = DerivedClock(guard, numbers, when, guard.age)
         else:
             moved = Guard(self._function(guard.function), guard.direction, when=when, at_start=guard.at_start)
-        new = None
-        if reset is not None:
-            values = self._function(WholeReset(reset.function, self.original.variables.components))
-            new = Reset(lambda t, x, p: (*values(t, x, p), *x[self.n :]))
-        return attrs.evolve(
-            transition, guard=moved, reset=new, part_of=transition.part_of or transition.name
+        entered = transition.target in own and transition.target != transition.source
+        counts = self._counted_anew(own[transition.target or ""] if entered else ())
+        values = (
+            self._function(WholeReset(reset.function, self.original.variables.components)) if reset else None
         )
+
+        def after(t: Any, x: Any, p: Any) -> tuple[Any, ...]:
+            found = tuple(x[: self.n] if values is None else values(t, x, p))
+            return (*found, *counts(t, x, p))
+
+        new = Reset(after) if reset is not None or entered else None
+        return attrs.evolve(transition, guard=moved, reset=new, part_of=transition.part_of or transition.name)
 
     def _function(self, function: Callable[..., Any]) -> Callable[..., Any]:
         """A function of the original system as one of the counted state."""
@@ -244,6 +279,12 @@ class _Counting:
     def _own(self, x: Any) -> Any:
         """The state of the original system."""
         return named_values(STATE, self.original.state_names, x[: self.n])
+
+
+def _without_narrow(knots: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Knots and pieces without the pieces that are no wider than rounding: both of their ends are one jump."""
+    wide = np.diff(knots, append=np.inf) > NARROW * np.abs(knots)
+    return knots[wide], rows[[0, *(1 + np.flatnonzero(wide))]]
 
 
 def _item(c: Symbol, items: Any) -> Expression:
