@@ -169,9 +169,9 @@ def _unproved(trajectory: Trajectory) -> Iterator[str]:
     if bounded:
         yield (
             f"Not all crossings of {', '.join(bounded)} are proved: the guard stays so close to zero that "
-            "its signs at the ends of pieces of a step decided, and two crossings between them may be missed. "
-            "Shorten the steps with max_step= of the solver, or write the guard such that it crosses zero at "
-            "a steeper angle."
+            "its signs at the ends of pieces of a step decided, and two crossings between them may be "
+            "missed. Shorten the steps with max_step= of the solver, or write the guard such that it crosses "
+            "zero at a steeper angle."
         )
 
 

@@ -54,7 +54,7 @@ IN_FLOORS: dict[type[Expression], Callable[..., Expression]] = {
 # A piece of a table that is narrower than this share of its place is a jump.
 NARROW = 16.0 * np.finfo(float).eps
 BINARY = (Less, LessEqual, Sign, Step)
-JUMPS = (*BINARY, Floor, Tabulated, *IN_FLOORS)
+JUMPS: tuple[Any, ...] = (*BINARY, Floor, Tabulated, *IN_FLOORS)
 
 
 @attrs.frozen
@@ -234,7 +234,7 @@ class _Counting:
 
     def _after(self, place: int, way: int) -> list[Expression]:
         """The state after one count has changed: those that depend on the count are counted anew."""
-        changed: dict[Expression, Expression] = {self.counts[place].symbol: self.counts[place].symbol + way}
+        changed: dict[Symbol, Expression] = {self.counts[place].symbol: self.counts[place].symbol + way}
         for each in self.counts[place + 1 :]:
             if mentions(each.now, changed):
                 [changed[each.symbol]] = all_replaced([each.now], changed)
@@ -282,7 +282,7 @@ class _Counting:
 
 
 def _without_narrow(knots: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Knots and pieces without the pieces that are no wider than rounding: both of their ends are one jump."""
+    """Knots and pieces without the pieces that are no wider than rounding: their two ends are one jump."""
     wide = np.diff(knots, append=np.inf) > NARROW * np.abs(knots)
     return knots[wide], rows[[0, *(1 + np.flatnonzero(wide))]]
 

@@ -135,17 +135,14 @@ def test_times_of_jumps_follow_a_jump_of_the_force_before_them():
     system, h = driven(lambda t, x, p: np.where(t > p.d, 2.0, 0.0), [hit]), 1e-5
     fine = Taylor(rtol=1e-13, atol=1e-13)
     up, down = (
-        simulate(system, START, (0.0, END), parameters={"d": DELAY + way * h}, solver=fine)
-        for way in (1, -1)
+        simulate(system, START, (0.0, END), parameters={"d": DELAY + way * h}, solver=fine) for way in (1, -1)
     )
     arc = simulate(system, START, (0.0, END), sensitivities=("d",))
     assert arc.status.ok
     assert len(arc.jumps) == len(up.jumps) > 1
     times = (up.jumps.t - down.jumps.t) / (2 * h)
     np.testing.assert_allclose(arc.jumps.t_sensitivity[:, 0], times, rtol=1e-5, atol=1e-5)
-    np.testing.assert_allclose(
-        arc.sensitivity[:, 0], (up.x[-1] - down.x[-1]) / (2 * h), rtol=1e-5, atol=1e-5
-    )
+    np.testing.assert_allclose(arc.sensitivity[:, 0], (up.x[-1] - down.x[-1]) / (2 * h), rtol=1e-5, atol=1e-5)
 
 
 def test_a_count_leaves_clocks_held_components_and_other_modes_as_they_are():
@@ -168,8 +165,7 @@ def test_a_count_leaves_clocks_held_components_and_other_modes_as_they_are():
     )
     h, fine = 1e-5, Taylor(rtol=1e-13, atol=1e-13)
     up, down = (
-        simulate(system, (0.3,), (0.0, 4.2), parameters={"d": 0.31 + way * h}, solver=fine)
-        for way in (1, -1)
+        simulate(system, (0.3,), (0.0, 4.2), parameters={"d": 0.31 + way * h}, solver=fine) for way in (1, -1)
     )
     arc = simulate(system, (0.3,), (0.0, 4.2), sensitivities=("d",))
     assert arc.status.ok

@@ -18,9 +18,7 @@ def system(guard, direction=1, reset=one_more, **kinds):
     return HybridSystem(
         state=("q",),
         modes=[Mode("run", lambda t, x, p: (1.0,))],
-        transitions=[
-            Transition("run", "run", Guard(guard, direction), reset and Reset(reset), name="tick")
-        ],
+        transitions=[Transition("run", "run", Guard(guard, direction), reset and Reset(reset), name="tick")],
         **kinds,
     )
 
@@ -74,8 +72,6 @@ def test_thirds_are_passed_although_they_are_no_numbers_of_the_machine():
     def third(q):
         return np.floor(3 * q) / 3
 
-    made = system(
-        lambda t, x, p: np.where(third(x.q) > x.n, 1.0, -1.0), 1, lambda t, x, p: {"n": third(x.q)}
-    )
+    made = system(lambda t, x, p: np.where(third(x.q) > x.n, 1.0, -1.0), 1, lambda t, x, p: {"n": third(x.q)})
     arc = simulate(made, (0.25, 0.0), SPAN)
     np.testing.assert_allclose(arc.jumps.t, np.arange(1, 39) / 3, rtol=1e-14)

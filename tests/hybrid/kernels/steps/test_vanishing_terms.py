@@ -1,4 +1,4 @@
-"""Series of affine modes some of whose coefficients are exactly zero, beside guards that are no polynomials."""
+"""Series of affine modes with coefficients that are exactly zero, beside guards that are no polynomials."""
 
 import numpy as np
 import pytest
