@@ -110,6 +110,7 @@ REPEATING = {
     "a ramp": lambda t, x, p: RAMP((p.d * t) % 3.5),
     "a pulse": lambda t, x, p: PULSE((p.d * t) % 3.5),
     "a delayed pulse": lambda t, x, p: PULSE((t - p.d) % 3.5),
+    "a falling ramp": lambda t, x, p: RAMP((-p.d * t) % 3.5),
 }
 
 
