@@ -203,7 +203,9 @@ class Arctanh(RealFunction):
 class Erf(RealFunction):
     """The error function."""
 
-    numpy, code, bounds, by_derivative = named("erf"), "erf", op.ERF, True
+    # SciPy is imported when there is a number to compute.
+    numpy = staticmethod(lambda u: named("erf")(u))
+    code, bounds, by_derivative = "erf", op.ERF, True
     parity, range = -1, _always(closed(-1.0, 1.0))
     slopes = (lambda u: number(2.0 / math.sqrt(math.pi)) * Exp(-power(u, TWO)),)
 
@@ -211,7 +213,8 @@ class Erf(RealFunction):
 class Erfc(RealFunction):
     """One less the error function, with all digits where that is small."""
 
-    numpy, code, bounds, by_derivative = named("erfc"), "erfc", op.ERFC, True
+    numpy = staticmethod(lambda u: named("erfc")(u))
+    code, bounds, by_derivative = "erfc", op.ERFC, True
     range = _always(closed(0.0, 2.0))
     slopes = (lambda u: -Erf(u).slope(),)
 
