@@ -11,7 +11,7 @@ from hybrid.compiler.emitted import Emitted
 from hybrid.errors import ModelError
 from hybrid.expression.pieces import Pieces
 from hybrid.expression.values import TraceError, values_of
-from hybrid.expression.vocabulary import WHERE
+from hybrid.expression.vocabulary import WHERE, named
 from hybrid.system.derivatives import complex_step, evaluate, sample_points
 from hybrid.system.functions import CONDITION, ModelFunction
 from hybrid.system.graph import HybridSystem, functions_of
@@ -274,7 +274,7 @@ class _Shaken:
 
     def combined(self, name: str, contents: tuple[Any, ...]) -> Any:
         """The value of the function with random last digits."""
-        value = np.where(*contents)[()] if name == WHERE else getattr(np, name)(*contents)
+        value = np.where(*contents)[()] if name == WHERE else named(name)(*contents)
         return _shake(value, self.rng) if value.dtype.kind == "f" else value
 
     def looked_up(self, pieces: Pieces, content: Any, derived: int) -> Any:

@@ -434,13 +434,14 @@ def _gradients(
 def _where_it_jumps(
     system: HybridSystem, index: int, field: Written, boundaries: Sequence[Boundary], symbols: Symbols
 ) -> str:
-    """Where the field of a mode jumps in the state, in words; empty if it is proved to jump nowhere."""
+    """Where the field of a mode jumps in what moves or is held, in words; empty if it is proved not to."""
     if field.expressions is None:
         function = field_function(system.modes[index], system.variables)
         differentiable = function.derivative is None or complex_step_error(system.variables, function) is None
         return "it branches" if may_jump(function.value, differentiable) else ""
     known = known_positive(boundaries)
-    places = jumps_of([simplified(entry, known) for entry in field.expressions], symbols.x)
+    states = symbols.x[: system.tangent_dimension]
+    places = jumps_of([simplified(entry, known) for entry in field.expressions], states)
     return ", or ".join(_in_names(system, place) for place in places)
 
 

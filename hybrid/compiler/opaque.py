@@ -125,7 +125,7 @@ def _compiled(name: str, opaque: OpaqueFunction) -> dict[str, Any]:
             for each, signature in signatures.items()
         }
     except Exception as error:
-        raise _refusal(opaque, scope, error) from error
+        raise _refusal(opaque, scope, error) from None
 
 
 def _text(opaque: OpaqueFunction) -> str:

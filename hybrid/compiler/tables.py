@@ -125,9 +125,14 @@ class Knots:
         with np.errstate(all="ignore"):
             times = ((knots - start) / (end - start)) % length
             bands = MARGIN * (np.abs(knots) + abs(start)) / abs(end - start)
-        times[times == 0.0] = length
+        begins = times == 0.0
+        times[begins] = length
         times[~(times > 0.0)] = np.inf
-        return times, np.where(start == 0.0, 0.0, bands)
+        bands = np.where(start == 0.0, 0.0, bands)
+        # A falling argument leaves a piece right behind its knot, also at the start of the first period.
+        soon = MARGIN * length if end < start and np.any(begins) else np.inf
+        times, bands = np.append(times, soon), np.append(bands, MARGIN * length)
+        return times, bands
 
     def _times(self, node: Tabulated, values: np.ndarray) -> np.ndarray:
         """The first times at which the argument of a table has reached its knots, in floating point."""

@@ -45,6 +45,7 @@ from hybrid.expression.operations import (
     Not,
     Or,
     Remainder,
+    Round,
     Select,
     Sign,
     Sin,
@@ -63,7 +64,7 @@ from hybrid.expression.text import text
 
 # Functions that change by their derivatives, other than sums, products and positive powers.
 GRADUAL = (Sin, Cos, Exp, Sinh, Cosh, Log)
-ROUNDING = (Floor, Ceiling, Truncate)
+ROUNDING = (Floor, Ceiling, Truncate, Round)
 REMAINDERS = (Remainder, TruncatedRemainder)
 JUMPS = (Less, LessEqual, Sign, Step, *ROUNDING, *REMAINDERS, Atan2)
 # A constant smaller than this fraction of the terms it is the sum of counts as rounding.
@@ -85,8 +86,8 @@ def jumps_of(field: Iterable[Expression], states: Sequence[Symbol]) -> list[str]
 def _surfaces(entry: Expression, states: Sequence[Symbol]) -> list[str]:
     if not contains(entry, (*JUMPS, Tabulated, WholeQuotient)):
         return []
-    quotients = nodes_of(WholeQuotient, entry)
-    entry = replaced(entry, {each: Floor(each.args[0] / each.args[1]) for each in quotients})
+    floors = nodes_of((WholeQuotient, Round), entry)
+    entry = replaced(entry, {each: each.in_other_terms(*each.args) for each in floors})
     jumps = (node for node in nodes_of((*JUMPS, Tabulated), entry) if moves(node, states) and _may_jump(node))
     atoms = sorted(jumps, key=order_of)
     names = {atom: Symbol(f"jump {i}") for i, atom in enumerate(atoms)}

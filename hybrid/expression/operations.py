@@ -11,11 +11,11 @@ says whether it is even (1) or odd (-1). ``in_other_terms`` expresses it by func
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
 
+from hybrid.expression.functions import RealFunction
 from hybrid.expression.nodes import (
     HALF,
     ONE,
@@ -39,42 +39,8 @@ from hybrid.expression.ranges import (
     exponential,
     extreme,
 )
+from hybrid.expression.vocabulary import named
 from hybrid.kernels.arithmetic import operations as op
-
-
-class RealFunction(Function):
-    """A function of real numbers; numbers are put in, a sign comes out where it may."""
-
-    __slots__ = ()
-    numpy: ClassVar[Any]
-    code: ClassVar[Any] = ""
-    bounds: ClassVar[Any] = 0
-    parity: ClassVar[int] = 0
-    range: ClassVar[Any] = staticmethod(lambda *parts: ANYTHING)
-    slopes: ClassVar[tuple[Callable[..., Expression], ...]] = ()
-    in_other_terms: ClassVar[Any] = None
-    by_derivative: ClassVar[bool] = False
-
-    @classmethod
-    def simplified(cls, *args: Expression) -> Expression | None:
-        """The number that it is of numbers; the value at the opposite if it is even or odd."""
-        if all(each.is_number for each in args):
-            return cls.of_numbers(*map(float, args))
-        if cls.parity and args[0].leads_with_minus:
-            value = cls(-args[0])
-            return value if cls.parity > 0 else -value
-        return None
-
-    @classmethod
-    def of_numbers(cls, *values: float) -> Number:
-        """The value at numbers; nan where there is none."""
-        with np.errstate(all="ignore"):
-            return number(float(cls.numpy(*values)))
-
-    def slope(self, place: int = 0) -> Expression:
-        """The derivative in one of the arguments."""
-        found: Expression = self.slopes[place](*self.args)
-        return found
 
 
 def _always(found: Range) -> Any:
@@ -234,6 +200,25 @@ class Arctanh(RealFunction):
     slopes = (lambda u: 1 / (1 - power(u, TWO)),)
 
 
+class Erf(RealFunction):
+    """The error function."""
+
+    # SciPy is imported when there is a number to compute.
+    numpy = staticmethod(lambda u: named("erf")(u))
+    code, bounds, by_derivative = "erf", op.ERF, True
+    parity, range = -1, _always(closed(-1.0, 1.0))
+    slopes = (lambda u: number(2.0 / math.sqrt(math.pi)) * Exp(-power(u, TWO)),)
+
+
+class Erfc(RealFunction):
+    """One less the error function, with all digits where that is small."""
+
+    numpy = staticmethod(lambda u: named("erfc")(u))
+    code, bounds, by_derivative = "erfc", op.ERFC, True
+    range = _always(closed(0.0, 2.0))
+    slopes = (lambda u: -Erf(u).slope(),)
+
+
 class Hypot(RealFunction):
     """``sqrt(a**2 + b**2)``, with slope 0 at the origin."""
 
@@ -277,6 +262,15 @@ class Truncate(PiecewiseConstant):
 
     word = "trunc"
     numpy, code, bounds = np.trunc, "np.trunc", op.TRUNCATE
+
+
+class Round(PiecewiseConstant):
+    """The nearest integer; the even one of two that are as near."""
+
+    word = "rint"
+    numpy, code, bounds = np.rint, "np.rint", op.ROUND
+    # But for the value at the jumps.
+    in_other_terms = staticmethod(lambda u: Floor(u + HALF))
 
 
 class Sign(PiecewiseConstant):

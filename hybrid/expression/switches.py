@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import cast
 
 import attrs
 
@@ -47,6 +48,7 @@ from hybrid.expression.operations import (
     Maximum,
     Minimum,
     Remainder,
+    Round,
     Select,
     Sign,
     Sin,
@@ -62,7 +64,7 @@ from hybrid.expression.surfaces import QUARTER, Sawtooth, Surfaces, core_of, is_
 from hybrid.expression.tracing import Symbols
 
 COMPARISONS = (Less, LessEqual, Equal)
-COUNTS = (Floor, Ceiling, Truncate, WholeQuotient, Remainder, TruncatedRemainder)
+COUNTS = (Floor, Ceiling, Truncate, Round, WholeQuotient, Remainder, TruncatedRemainder)
 SWITCHING = (*COMPARISONS, *COUNTS, Sign, Step, Absolute, Maximum, Minimum)
 
 
@@ -212,9 +214,8 @@ def _rewritten(atom: Expression, surfaces: Surfaces) -> Expression | None:
     if isinstance(atom, Equal):
         # It holds on a surface only, not beside it.
         return ZERO
-    if isinstance(atom, WholeQuotient):
-        a, b = atom.args
-        return Floor(a / b)
+    if isinstance(atom, WholeQuotient | Round):
+        return cast(Expression, atom.in_other_terms(*atom.args))
     if isinstance(atom, Remainder):
         a, b = atom.args
         surfaces.quotients[a / b] = a, b

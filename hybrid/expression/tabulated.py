@@ -7,9 +7,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from hybrid.expression.functions import RealFunction
 from hybrid.expression.graph import Group, all_replaced, degree_of, mentions, nodes_of, replaced, symbols_of
 from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol, _kept, add, number
-from hybrid.expression.operations import Absolute, Less, RealFunction, Remainder, Select
+from hybrid.expression.operations import Absolute, Less, Remainder, Select
 from hybrid.expression.pieces import Pieces
 from hybrid.expression.ranges import Range, closed
 from hybrid.expression.values import looked_up

@@ -17,9 +17,10 @@ from hybrid.expression.splines import teach_splines
 from hybrid.expression.tabulated import Tabulated
 from hybrid.expression.text import text
 from hybrid.expression.ufuncs import RULES
-from hybrid.expression.values import NEEDS_TABLE, values_of
 from hybrid.expression.values import Traced as Traced
 from hybrid.expression.values import TraceError as TraceError
+from hybrid.expression.values import values_of
+from hybrid.expression.vocabulary import NEEDS_TABLE
 
 # Largest number of operations of an expression shown in an error text.
 SHOWN = 100

@@ -1,4 +1,4 @@
-"""NumPy's universal functions as operations on expressions."""
+"""Universal functions of NumPy and SciPy as operations on expressions."""
 
 from __future__ import annotations
 
@@ -66,6 +66,8 @@ RULES: dict[str, Callable[..., Any]] = {
     "arcsinh": ops.Arcsinh,
     "arccosh": ops.Arccosh,
     "arctanh": ops.Arctanh,
+    "erf": ops.Erf,
+    "erfc": ops.Erfc,
     "hypot": ops.Hypot,
     "deg2rad": lambda a: DEGREE * a,
     "radians": lambda a: DEGREE * a,
@@ -74,6 +76,7 @@ RULES: dict[str, Callable[..., Any]] = {
     "floor": ops.Floor,
     "ceil": ops.Ceiling,
     "trunc": ops.Truncate,
+    "rint": ops.Round,
     "maximum": ops.Maximum,
     "minimum": ops.Minimum,
     "fmax": ops.LargerNumber,

@@ -27,12 +27,20 @@ from hybrid.expression.text import text
 from hybrid.expression.vocabulary import (
     BITWISE,
     CONTRACTIONS,
+    FOREIGN,
     INSTEAD,
+    NEEDS_CHOICE,
+    NEEDS_COPY,
+    NEEDS_FLOATS,
+    NEEDS_NUMBER,
+    NEEDS_TABLE,
+    NEEDS_WHOLE_NUMBER,
     OF_TRUTHS,
     REDUCTIONS,
     TRUTHS,
     UFUNCS,
     WHERE,
+    named,
 )
 from hybrid.system.variables import PARAMETERS, STATE, named_values
 
@@ -81,24 +89,6 @@ def refusal(text: str) -> TraceError:
     error = TraceError(text)
     _REFUSALS.get([]).append(error)
     return error
-
-
-NEEDS_NUMBER = (
-    "a number is needed where tracing has a symbol: use np.sin in place of math.sin (and so on), and "
-    "np.zeros_like(x) in place of np.zeros to fill an array"
-)
-NEEDS_WHOLE_NUMBER = "a whole number is needed where tracing has a symbol: use"
-NEEDS_FLOATS = "an array of floats cannot take symbols: use np.zeros_like(x) in place of np.zeros"
-NEEDS_CHOICE = "a condition as an index cannot be traced: write np.where(x > 0, x, 0) in place of x[x > 0]"
-NEEDS_TABLE = "a spline of SciPy needs a number: call hybrid.Table(spline), made once, in its place"
-NEEDS_COPY = "it writes into its argument: take a copy first, x = x.copy()"
-
-
-FOREIGN = (
-    "only NumPy's functions can be traced or compiled. Write it with these, as a series or a fit, or carry "
-    "its value as a component of the state, whose rate is the derivative of the function times that of its "
-    "argument"
-)
 
 
 class Traced(NDArrayOperatorsMixin):
@@ -181,8 +171,8 @@ class Traced(NDArrayOperatorsMixin):
     def __ceil__(self) -> int:
         raise refusal(f"{NEEDS_WHOLE_NUMBER} np.ceil(x)")
 
-    def __round__(self, digits: int | None = None) -> int:
-        raise refusal(f"{NEEDS_WHOLE_NUMBER} np.floor(x + 0.5)")
+    def __round__(self, digits: int | None = None) -> Any:
+        return _rounded(self, digits or 0)
 
     def __hash__(self) -> int:
         raise refusal("a number is needed as a key: a lookup in a table by the state cannot be traced")
@@ -242,7 +232,7 @@ def _unknown(name: str, reason: str = "") -> TraceError:
 
 
 def _known(ufunc: np.ufunc) -> str:
-    if getattr(np, ufunc.__name__, None) is not ufunc:
+    if named(ufunc.__name__) is not ufunc:
         raise refusal(f"{ufunc.__name__} is not a function of NumPy: {FOREIGN}")
     if ufunc.__name__ not in UFUNCS | BITWISE:
         raise _unknown(ufunc.__name__)
@@ -283,7 +273,7 @@ def _operation(name: str, arguments: tuple[Any, ...], counts: bool) -> tuple[str
 @cache
 def _of_booleans(name: str) -> np.dtype[Any] | None:
     """The type that NumPy gives a function of booleans; None if it has none."""
-    ufunc = getattr(np, name)
+    ufunc = named(name)
     try:
         found: np.dtype[Any] = ufunc.resolve_dtypes((np.dtype(bool),) * ufunc.nin + (None,) * ufunc.nout)[-1]
     except TypeError:
@@ -360,6 +350,12 @@ def _clipped(a: Any, a_min: Any = None, a_max: Any = None, **bounds: Any) -> Any
     return a if high is None else np.minimum(a, high)
 
 
+def _rounded(a: Any, decimals: int = 0) -> Any:
+    """As NumPy rounds, half to even."""
+    scale = 10.0 ** abs(decimals)
+    return np.rint(a * scale) / scale if decimals > 0 else np.rint(a / scale) * scale
+
+
 def looked_up(pieces: Pieces, u: Any, derived: int = 0) -> Any:
     """The values of a table, or of a derivative, at numbers or traced numbers of any shape."""
     if not is_traced(u):
@@ -433,6 +429,8 @@ def _piecewise(x: Any, conditions: Any, functions: Any, *args: Any, **kwargs: An
 FUNCTIONS: dict[Any, Callable[..., Any]] = {
     np.where: _where,
     np.clip: _clipped,
+    np.round: _rounded,
+    np.around: _rounded,
     np.select: _select,
     np.piecewise: _piecewise,
     np.interp: _interpolated,

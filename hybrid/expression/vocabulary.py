@@ -1,6 +1,14 @@
-"""The functions of NumPy that model functions may call, by what is known of them."""
+"""The functions that model functions may call, by what is known of them."""
 
-# NumPy's universal functions that can be traced; ``hybrid.expression.ufuncs`` has a rule for each.
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+# Those of scipy.special that can be traced.
+SPECIAL = frozenset({"erf", "erfc"})
+# The universal functions that can be traced; ``hybrid.expression.ufuncs`` has a rule for each.
 UFUNCS = frozenset(
     {
         "add", "subtract", "multiply", "divide", "floor_divide", "remainder", "fmod", "power", "float_power",
@@ -9,7 +17,7 @@ UFUNCS = frozenset(
         "arctan2", "sinh", "cosh", "tanh", "arcsinh", "arccosh", "arctanh", "hypot", "deg2rad", "radians",
         "rad2deg", "degrees", "floor", "ceil", "trunc", "maximum", "minimum", "fmax", "fmin", "clip",
         "heaviside", "less", "less_equal", "greater", "greater_equal", "equal", "not_equal", "logical_and",
-        "logical_or", "logical_xor", "logical_not", "conjugate",
+        "logical_or", "logical_xor", "logical_not", "conjugate", "rint", *SPECIAL,
     }
 )  # fmt: skip
 # Those that give booleans, whatever their arguments.
@@ -32,8 +40,6 @@ BITWISE = frozenset({"bitwise_and", "bitwise_or", "bitwise_xor", "invert"})
 REDUCTIONS = ("reduce", "accumulate", "reduceat")
 # What to write in place of functions that cannot be traced.
 INSTEAD = {
-    "rint": "np.floor(x + 0.5)",
-    "round": "np.floor(x + 0.5)",
     "logaddexp": "np.log(np.exp(a) + np.exp(b))",
     "logaddexp2": "np.log2(np.exp2(a) + np.exp2(b))",
     "copysign": "np.abs(a)*np.sign(b)",
@@ -44,5 +50,29 @@ INSTEAD = {
     "angle": "np.arctan2(y, x)",
     "sort": "np.minimum(a, b) and np.maximum(a, b)",
 }
+# What to write in place of what tracing cannot follow.
+NEEDS_NUMBER = (
+    "a number is needed where tracing has a symbol: use np.sin in place of math.sin (and so on), "
+    "scipy.special.erf in place of math.erf, and np.zeros_like(x) in place of np.zeros to fill an array"
+)
+NEEDS_WHOLE_NUMBER = "a whole number is needed where tracing has a symbol: use"
+NEEDS_FLOATS = "an array of floats cannot take symbols: use np.zeros_like(x) in place of np.zeros"
+NEEDS_CHOICE = "a condition as an index cannot be traced: write np.where(x > 0, x, 0) in place of x[x > 0]"
+NEEDS_TABLE = "a spline of SciPy needs a number: call hybrid.Table(spline), made once, in its place"
+NEEDS_COPY = "it writes into its argument: take a copy first, x = x.copy()"
+FOREIGN = (
+    "only NumPy's functions can be traced or compiled. Write it with these, as a series or a fit, or carry "
+    "its value as a component of the state, whose rate is the derivative of the function times that of its "
+    "argument"
+)
 # These form sums of products, which NumPy does on object arrays with the operators of the scalars.
 CONTRACTIONS = ("matmul", "vecdot", "matvec", "vecmat")
+
+
+def named(name: str) -> Any:
+    """The universal function of that name, of scipy.special or else of NumPy; None if there is none."""
+    if name not in SPECIAL:
+        return getattr(np, name, None)
+    import scipy.special
+
+    return getattr(scipy.special, name)

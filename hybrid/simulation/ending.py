@@ -157,23 +157,19 @@ def _steep_in_time(trajectory: Trajectory, mode: int) -> str:
 
 def _unproved(trajectory: Trajectory) -> Iterator[str]:
     """A note on guards whose crossings are not proved."""
-    steps = trajectory.run.unproved
-    if not steps:
-        return
-    names = trajectory.system.transition_names
-    sampled = [repr(name) for i, name in enumerate(names) if trajectory.compiled.emitted.is_sampled(i)]
+    steps, is_sampled = trajectory.run.unproved, trajectory.compiled.emitted.is_sampled
+    names = [(i, repr(name)) for i, name in enumerate(trajectory.system.transition_names) if steps[i]]
+    sampled = [name for i, name in names if is_sampled(i)]
     if sampled:
         yield (
             f"The crossings of {', '.join(sampled)} are not proved: the guard could not be traced, so it "
             "was sampled on each step. Write it with NumPy functions (np.sin, np.where)."
         )
-    else:
-        emitted = trajectory.compiled.emitted
-        bounded = [repr(name) for i, name in enumerate(names) if not emitted.affine_guard[i]]
-        whose = f"the guard of {bounded[0]}" if len(bounded) == 1 else f"a guard of {', '.join(bounded)}"
+    bounded = [name for i, name in names if not is_sampled(i)]
+    if bounded:
         yield (
-            f"On {steps} steps the crossings of {whose} are not proved: the guard stays so close to zero "
-            "that its signs at the ends of pieces of the step decided, and two crossings between them may be "
+            f"Not all crossings of {', '.join(bounded)} are proved: the guard stays so close to zero that "
+            "its signs at the ends of pieces of a step decided, and two crossings between them may be "
             "missed. Shorten the steps with max_step= of the solver, or write the guard such that it crosses "
             "zero at a steeper angle."
         )

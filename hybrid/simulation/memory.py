@@ -226,6 +226,7 @@ def run_layout(dimension: int, tangents: int, modes: int, transitions: int, tick
         "recent": (RECENT,),
         "rehearsal": (4, transitions),
         "passed": (transitions,),
+        "unproved": (transitions,),
         "visits": (RECENT, n + 2),
         "tick": (transitions,),
         "ticked": (transitions,),

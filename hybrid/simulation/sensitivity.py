@@ -14,10 +14,18 @@ from hybrid.simulation.jumps import Jump, Jumps
 from hybrid.simulation.trajectory import start
 from hybrid.solvers import Solver
 from hybrid.status import apart_status
-from hybrid.system.functions import guard_function
+from hybrid.system.derivatives import evaluate
+from hybrid.system.functions import field_function, guard_function
 from hybrid.transform.aged import aged, with_age
+from hybrid.transform.counted import Counted, counted
 from hybrid.transform.extended import extended, with_parameters
 from hybrid.transform.restricted import restricted
+
+# A guard is at rest at a jump if its speed there is this share of that a little before.
+AT_REST = 1e-3
+# Shares of the way back to a place before the jump, and the weights that extrapolate from there to the jump.
+BEFORE_REST = 0.02 * np.arange(1, 7)
+TO_REST = np.array([6.0, -15.0, 20.0, -15.0, 6.0, -1.0])
 
 
 @attrs.frozen(eq=False)
@@ -33,14 +41,17 @@ class Sensitivities:
         Names of the parameters.
     components
         Those of a tangent vector ``(n,)`` that the run itself has: not the age.
+    counted
+        The extended system, with the jumps of its fields in time as events.
     arc
-        The run of the extended system.
+        The run of that system.
     jumps
         The jumps of the run itself, if they were kept.
     """
 
     names: tuple[str, ...]
     components: np.ndarray
+    counted: Counted
     arc: HybridArc
     jumps: Jumps | None
     x0: np.ndarray
@@ -65,7 +76,8 @@ class Sensitivities:
     @cached_property
     def times(self) -> np.ndarray:
         """Derivatives ``(jumps, n + m)`` of the times of jumps; nan for the limit of a chatter."""
-        jumps = self.arc.jumps if self.jumps is None else self.jumps
+        jumps = self.jumps
+        assert jumps is not None, "only the jumps of a run have times"
         found = np.full((len(jumps), self.arc.system.tangent_dimension), np.nan)
         before = np.append(self.t0, jumps.t[:-1])
         # A jump that another sets off happens at the time of that one.
@@ -106,21 +118,54 @@ class Sensitivities:
         return found
 
     def _time_of(self, jump: Jump, t: float, x: np.ndarray, tangents: np.ndarray) -> np.ndarray:
-        """Derivatives ``(n + m,)`` of the time of a jump, from a state before it in its mode."""
-        system = self.arc.system
-        alone = restricted(system, jump.source)
-        run = self.simulate(
-            alone, x, (t, jump.t), parameters=self.arc.parameters, solver=self.solver, tangent=tangents
+        """Derivatives ``(n + m,)`` of the time of a jump, from a state before it in its mode.
+
+        The guard of a tank that runs dry comes to rest where its root vanishes. There its change and its
+        speed are both zero, and their quotient follows from places before.
+        """
+        system, assumed = self.arc.system, self.jumps
+        assert assumed is not None, "only the jumps of a run have times"
+        place = with_parameters(
+            self.counted.original,
+            with_age(assumed.system, jump.x_minus),
+            self.x0[self._first : system.tangent_dimension],
         )
-        index = system.transition_index(jump.transition)
-        function = guard_function(system.transitions[index])
-        values = system.parameter_values(self.arc.parameters)
-        first, last = self._first, system.tangent_dimension
-        before = jump.x_minus if self.jumps is None else with_age(self.jumps.system, jump.x_minus)
-        place = with_parameters(system, before, self.x0[first:last])
-        slope = compile_system(system).derivative(function, index, jump.t, place, values)[0, :last]
+        place = self.counted.state(jump.t, place, self.arc.parameters)
+        slope, _ = self._slope(jump, jump.t, place)
+        if compile_system(system).emitted.steep[system.mode_index(jump.source)]:
+            before = [self._moved(jump, t, x, tangents, share) for share in BEFORE_REST]
+            slopes = [self._slope(jump, when, state) for when, state, _ in before]
+            if abs(jump.transversality) <= AT_REST * abs(slopes[0][1]):
+                quotients = [
+                    -(along @ moved) / speed
+                    for (along, speed), (_, _, moved) in zip(slopes, before, strict=True)
+                ]
+                return np.asarray(TO_REST @ np.array(quotients))
+        return -(slope @ self._moved(jump, t, x, tangents, 0.0)[2]) / jump.transversality
+
+    def _moved(
+        self, jump: Jump, t: float, x: np.ndarray, tangents: np.ndarray, share: float
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        """Time, state and tangent vectors at a share of the way back from a jump to a state before it."""
+        alone = restricted(self.arc.system, jump.source, self.counted.events_in(jump.source))
+        when = jump.t - share * (jump.t - t)
+        run = self.simulate(
+            alone, x, (t, when), parameters=self.arc.parameters, solver=self.solver, tangent=tangents
+        )
         assert run.fundamental is not None
-        return -(slope @ run.fundamental) / jump.transversality
+        return when, run.x[-1], run.fundamental
+
+    def _slope(self, jump: Jump, t: float, x: np.ndarray) -> tuple[np.ndarray, float]:
+        """The gradient ``(n + m,)`` of a guard at a state, and its speed along the field of its mode."""
+        system = self.arc.system
+        index, mode = system.transition_index(jump.transition), system.mode_index(jump.source)
+        values = system.parameter_values(self.arc.parameters)
+        function = guard_function(system.transitions[index])
+        [slope] = compile_system(system).derivative(function, index, t, x, values)
+        field = field_function(system.modes[mode], system.variables).value
+        rates = evaluate(system.variables, field, t, x, values)
+        speed = np.nan if rates is None else slope[:-1] @ rates + slope[-1]
+        return slope[: system.tangent_dimension], float(speed)
 
 
 def with_sensitivities(
@@ -137,17 +182,20 @@ def with_sensitivities(
 ) -> HybridArc:
     """The arc of a run with its derivatives, from the run of the extended system that goes the same way.
 
-    If that run has other jumps, both are right within the tolerances, and the status says so.
+    If that run has other jumps, both are right within the tolerances, and the status says so. Else the status
+    is that of the run with derivatives, if there is anything to tell of it.
     """
     whole = aged(arc.system)
-    system, n, m = extended(whole, names), whole.tangent_dimension, len(names)
+    n, m = whole.tangent_dimension, len(names)
+    parameters = {name: value for name, value in arc.parameters.items() if name not in names}
+    found = counted(extended(whole, names), m)
     own = np.arange(arc.system.tangent_dimension)
     begin = with_parameters(
-        system, with_age(arc.system, x0), np.array([arc.parameters[name] for name in names])
+        found.original, with_age(arc.system, x0), np.array([arc.parameters[name] for name in names])
     )
-    parameters = {name: value for name, value in arc.parameters.items() if name not in names}
+    begin = found.state(t_span[0], begin, parameters)
     again = simulate(
-        system,
+        found.system,
         begin,
         t_span,
         mode=mode,
@@ -157,13 +205,13 @@ def with_sensitivities(
         max_jumps=max_jumps,
     )
     jumps = arc.jumps if arc.keeps_jumps else None
-    known = Sensitivities(names, own, again, jumps, begin, mode, t_span[0], samples, solver, simulate)
+    known = Sensitivities(names, own, found, again, jumps, begin, mode, t_span[0], samples, solver, simulate)
     status = arc.status
     # How many jumps of a chatter are followed, up to its limit, is no property of the run.
-    apart = again.jump_count != arc.jump_count and "limit" not in again.jumps.kind
-    if apart or again.status.code != arc.status.code:
-        status = apart_status(arc.jump_count, again.jump_count)
-    elif status.ok and not again.status.ok:
+    others = sum(name not in found.events for name in again.jumps.transition)
+    if others != arc.jump_count and "limit" not in again.jumps.kind:
+        status = apart_status(arc.jump_count, others)
+    elif not again.status.ok:
         status = again.status
     jumps = None if jumps is None else attrs.evolve(jumps, sensitivities=known)
     return attrs.evolve(arc, jumps=jumps, sensitivities=known, status=status)

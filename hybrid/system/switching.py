@@ -22,6 +22,7 @@ WRITTEN = {
     "absolute": "abs",
     "fabs": "abs",
     "remainder": "mod",
+    "rint": "round",
     "fmax": "maximum",
     "fmin": "minimum",
     "less": "<",
@@ -126,6 +127,8 @@ class _Probe(NDArrayOperatorsMixin):
         plain = [*map(_plain, args)]
         if function is np.clip and len(plain) == 3:
             self.log.append(("clip", _heights("clip", plain)))
+        if function in (np.round, np.around):
+            self.log.append(("rint", _heights("rint", plain)))
         result = function(*plain, **{name: _plain(each) for name, each in kwargs.items()})
         return _Probe(result, self.log) if np.ndim(result) == 0 else result
 
@@ -144,6 +147,9 @@ class _Probe(NDArrayOperatorsMixin):
 
     def __int__(self) -> int:
         return int(self.value)
+
+    def __round__(self, digits: int | None = None) -> Any:
+        return np.round(self, digits or 0)
 
     def __hash__(self) -> int:
         return hash(self.value)

@@ -13,7 +13,7 @@ import attrs
 import numpy as np
 
 from hybrid.expression.values import values_of
-from hybrid.expression.vocabulary import TRUTHS, WHERE
+from hybrid.expression.vocabulary import TRUTHS, WHERE, named
 from hybrid.system.functions import CONDITION
 from hybrid.system.graph import HybridSystem, as_system, functions_of
 from hybrid.system.watched import is_of_library
@@ -42,10 +42,10 @@ ALIKE = {
 }
 OF_NUMBERS = {
     "exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "sin", "cos", "tan", "arcsin", "arccos",
-    "arctan", "sinh", "cosh", "tanh", "arcsinh", "arccosh", "arctanh",
+    "arctan", "sinh", "cosh", "tanh", "arcsinh", "arccosh", "arctanh", "erf", "erfc",
 }  # fmt: skip
 GIVING_NUMBERS = {"arctan2", "sign", "heaviside"} | OF_NUMBERS | TRUTHS
-KEEPING = {"negative", "positive", "absolute", "fabs", "conjugate", "floor", "ceil", "trunc"}
+KEEPING = {"negative", "positive", "absolute", "fabs", "conjugate", "floor", "ceil", "trunc", "rint"}
 POWERS = {"square": 2.0, "sqrt": 0.5, "cbrt": 1.0 / 3.0, "reciprocal": -1.0}
 TURNED = dict.fromkeys(("radians", "deg2rad"), "rad/deg") | dict.fromkeys(("degrees", "rad2deg"), "deg/rad")
 
@@ -127,7 +127,7 @@ class UnitAlgebra:
         literals = [each.literal for each in contents]
         if None not in literals:
             with np.errstate(all="ignore"):
-                return self.number(getattr(np, name)(*literals))
+                return self.number(named(name)(*literals))
         names = dict.fromkeys(each for content in contents for each in content.names)
         return attrs.evolve(self._result(name, contents), names=tuple(names)[:MOST_NAMES])
 

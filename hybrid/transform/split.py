@@ -71,10 +71,10 @@ def split(system: HybridSystem) -> HybridSystem:
 
     Switching functions are found in fields, guards and resets: ``sign``, ``abs``, ``maximum``, ``minimum``,
     ``clip``, ``heaviside``, ``where``, ``select``, ``piecewise``, comparisons joined by ``&``, ``|``, ``~``,
-    ``floor``, ``ceil``, ``trunc``, ``mod`` and ``fmod``, nested in any way. Each has a surface ``h = 0``; one
-    that is written twice counts once. Each mode becomes the modes between these surfaces, named by their
-    sides, such as ``v<0, q>1``. A long height is named ``h1`` or the like, which ``repr`` shows in full. With
-    several modes of the user's, theirs comes first: ``flight: v<0``.
+    ``floor``, ``ceil``, ``trunc``, ``round``, ``mod`` and ``fmod``, nested in any way. Each has a surface
+    ``h = 0``; one that is written twice counts once. Each mode becomes the modes between these surfaces,
+    named by their sides, such as ``v<0, q>1``. A long height is named ``h1`` or the like, which ``repr``
+    shows in full. With several modes of the user's, theirs comes first: ``flight: v<0``.
 
     Where the field is continuous across a surface, or has the same speed through it on either side, the
     transition is a plain crossing. Where the speed through the surface jumps, there is also a mode ``v=0``

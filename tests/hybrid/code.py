@@ -14,6 +14,7 @@ from hybrid.compiler.llvm.lowering import SERIES_SIGNATURE, VECTOR_SIGNATURE, Fu
 from hybrid.compiler.llvm.machine import machine_code
 from hybrid.compiler.statements.code import at
 from hybrid.compiler.statements.values import assignments
+from hybrid.expression.vocabulary import named
 from hybrid.kernels.arithmetic import columns, doubled, lanes, tables
 
 OF_MATH = (
@@ -46,7 +47,8 @@ OPERATIONS = {
     "table": tables.table,
     "divided_dot_product": doubled.divided_dot_product,
     **{name: getattr(np, name) for name in OF_MATH},
-    **{f"np.{name}": getattr(np, name) for name in ("floor", "ceil", "trunc", "fmod")},
+    **{f"np.{name}": getattr(np, name) for name in ("floor", "ceil", "trunc", "rint", "fmod")},
+    **{name: named(name) for name in ("erf", "erfc")},
     **{name: getattr(lanes, name) for name in ("load", "store", "store_down", "store_row", "four_times")},
     **{
         name: getattr(columns, name)

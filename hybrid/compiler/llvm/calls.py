@@ -122,15 +122,15 @@ def _table(builder: Any, p: Any, first: int, count: int, degree: int, order: int
 
 
 IN_LIBM = (
-    "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cosh", "expm1", "hypot", "log1p", "sinh",
-    "tan", "tanh",
+    "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cosh", "erf", "erfc", "expm1", "hypot",
+    "log1p", "sinh", "tan", "tanh",
 )  # fmt: skip
 IN_LLVM = ("cos", "copysign", "exp", "log", "log10", "log2", "pow", "sin", "sqrt")
 
 CALLS = {
     **{name: _of_libm(name) for name in IN_LIBM},
     **{name: _of_llvm(name) for name in IN_LLVM},
-    **{f"np.{name}": _of_llvm(name) for name in ("floor", "ceil", "trunc")},
+    **{f"np.{name}": _of_llvm(name) for name in ("floor", "ceil", "trunc", "rint")},
     "abs": _of_llvm("fabs"),
     "max": Call(_largest, on_numbers=True),
     "np.fmod": Call(lambda builder, a, b: builder.frem(a, b), on_numbers=True),

@@ -19,6 +19,10 @@ ROUNDING = 4.5e-16
 ROUNDING_OF_CUBE_ROOT = 2e-14
 HUGE = 1.7976931348623157e308
 PI = math.pi
+# Sums of multiples of 1 / GRID up to this size have 53 binary digits at most.
+GRID, LARGEST_ON_GRID = 2.0**20, 2.0**31
+# The slope of the error function at zero.
+SLOPE_OF_ERF = 2.0 / math.sqrt(math.pi)
 # The sine of an argument beyond this has no digits left.
 FAR = 1e14
 
@@ -45,15 +49,34 @@ def exact_product(a, b, c, d):
 
 
 @njit(**INLINE)
+def _are_short(a, b):
+    """Whether two numbers have 24 binary digits at most, as whole numbers up to 16 million have.
+
+    The product of two such numbers is exact.
+    """
+    return abs(a) + abs(b) < math.inf and np.float32(a) == a and np.float32(b) == b
+
+
+@njit(**INLINE)
 def product(a, b, c, d):
-    """``[a, b] * [c, d]``, rounded outwards."""
+    """``[a, b] * [c, d]``, rounded outwards; the product of whole numbers is exact."""
     low, high = exact_product(a, b, c, d)
+    if _are_short(a, b) and _are_short(c, d):
+        return low, high
     return widened(low, high, ROUNDING)
 
 
 @njit(**INLINE)
+def _is_on_grid(a):
+    """Whether a number is one of those, whole numbers among them, whose sums are exact."""
+    return abs(a) < LARGEST_ON_GRID and np.floor(GRID * a) == GRID * a
+
+
+@njit(**INLINE)
 def added(a, b, c, d):
-    """``[a, b] + [c, d]``."""
+    """``[a, b] + [c, d]``, rounded outwards; the sum of whole numbers is exact."""
+    if _is_on_grid(a) and _is_on_grid(b) and _is_on_grid(c) and _is_on_grid(d):
+        return a + c, b + d
     return widened(a + c, b + d, ROUNDING)
 
 
@@ -62,6 +85,10 @@ def quotient(a, b, c, d):
     """``[a, b] / [c, d]``; the whole line if the divisor changes sign."""
     if (c < 0.0 < d) or (c == 0.0 and d == 0.0):
         return -math.inf, math.inf
+    if a == b and c == d:
+        found = a / c
+        if _are_short(found, c) and found * c == a:
+            return found, found
     least = 1.0 / d if d != 0.0 else -math.inf
     most = 1.0 / c if c != 0.0 else math.inf
     low, high = exact_product(a, b, least, most)
@@ -255,6 +282,12 @@ def range_of_rare(code, low, high):
         return np.ceil(low), np.ceil(high)
     if code == op.TRUNCATE:
         return np.trunc(low), np.trunc(high)
+    if code == op.ROUND:
+        return np.rint(low), np.rint(high)
+    if code == op.ERF:
+        return widened(math.erf(low), math.erf(high), 2.0 * ROUNDING)
+    if code == op.ERFC:
+        return widened(math.erfc(high), math.erfc(low), 16.0 * ROUNDING)
     if code == op.SIGN:
         return float((low > 0.0) - (low < 0.0)), float((high > 0.0) - (high < 0.0))
     if code == op.STEP:
@@ -335,6 +368,10 @@ def slope_of_rare(code, low, high, least, most):
     if op.FLOOR <= code <= op.STEP:
         return 0.0, 0.0 if least == most else math.inf
     below, above = whole_power(low, high, 2)
+    if code == op.ERF or code == op.ERFC:
+        below, above = range_of(op.EXP, -above, -below)
+        below, above = product(below, above, SLOPE_OF_ERF, SLOPE_OF_ERF)
+        return (below, above) if code == op.ERF else (-above, -below)
     if code == op.ACOSH:
         return quotient(1.0, 1.0, math.sqrt(max(below - 1.0, 0.0)), math.sqrt(max(above - 1.0, 0.0)))
     below, above = max(1.0 - above, 0.0), max(1.0 - below, 0.0)

@@ -64,7 +64,8 @@ def _whole_line(row):
 def bound_state(path, column, middle, radius, row):
     """Bound a component of the path around ``middle`` by a parabola and its remainder.
 
-    The remainder is at most ``radius**3`` times the sum of ``C(k, 3) |c_k| end**(k - 3)``.
+    The remainder is at most ``radius**3`` times the sum of ``C(k, 3) |c_k| end**(k - 3)``. A component that
+    is constant on the path has no rounding.
     """
     end = middle + radius
     value, slope, bend = 0.0, 0.0, 0.0
@@ -79,7 +80,7 @@ def bound_state(path, column, middle, radius, row):
         size = size * end + magnitude
         if k > 2:
             third = third * end + magnitude * (k * (k - 1.0) * (k - 2.0) / 6.0)
-    rounding = 4.0 * EPSILON * size
+    rounding = 4.0 * EPSILON * size if size > abs(path.powers[0, column]) else 0.0
     row[LOW_MIDDLE], row[HIGH_MIDDLE] = value - rounding, value + rounding
     turn = 2.0 * abs(bend) * radius + 3.0 * third * radius * radius
     turn += 4.0 * EPSILON * (steep + turn)

@@ -36,6 +36,7 @@ def keep_side(run, transition):
     """Remember what is known of a guard at the start of a step."""
     run.rehearsal[0, transition] = run.side[transition]
     run.rehearsal[1, transition] = run.on_guard[transition]
+    run.rehearsal[2, transition] = run.unproved[transition]
     run.rehearsal[3, transition], run.passed[transition] = 0, NO_ROOT
 
 
@@ -95,6 +96,7 @@ def restore_sides(model, run):
         transition = model.outgoing[slot]
         run.side[transition] = run.rehearsal[0, transition]
         run.on_guard[transition] = run.rehearsal[1, transition]
+        run.unproved[transition] = run.rehearsal[2, transition]
         run.rehearsal[3, transition] = 0
 
 

@@ -100,8 +100,8 @@ def side_of(model, run, place, transition, came, before, work):
 
     A guard within its rounding is on the side to which the flow takes it. If it is at rest there, it has not
     crossed: it keeps the side ``before`` if it was on the guard then, or fires both ways; otherwise it is on
-    the near side. A guard without a value keeps its side. At the start of a run a guard that jumps has the
-    side of its sign.
+    the near side. A guard without a value keeps its side. A guard that jumps is never at rest: if the flow
+    does not tell its side, and at the start of a run, its sign does.
     """
     _, t, x = place
     value = guard_value(model, transition, t, x, work.scalar)
@@ -112,11 +112,14 @@ def side_of(model, run, place, transition, came, before, work):
     sign = 1 if value > 0.0 else -1
     if abs(value) == math.inf or abs(value) > band:
         return sign, 0
-    if came == STARTED and value != 0.0 and may_jump(model, run, transition, t, x, work):
+    jumps = value != 0.0 and may_jump(model, run, transition, t, x, work)
+    if came == STARTED and jumps:
         return sign, 0
     side, _, straight = sign_at_speed(model, run, transition, place, 1.0, speed, band, work)
     if side != 0:
         return side, BY_SPEED if straight else LATER
+    if jumps:
+        return sign, 0
     direction = model.direction[transition]
     keeps = before.side != 0 and (before.order > 0 or direction == 0)
     return before.side if keeps else -direction, AT_REST
@@ -180,8 +183,13 @@ def is_held(model, run, place, transition, towards, work):
 
 @njit(**KERNEL)
 def crosses_slowly(model, run, place, transition, work):
-    """Whether the jump that led here has crossed its guard with no more speed than rounding makes."""
+    """Whether the jump that led here has crossed its guard with no more speed than rounding makes.
+
+    The speed of a guard that may jump says nothing.
+    """
     mode, t, x = place
+    if may_jump(model, run, transition, t, x, work):
+        return False
     guard_speed(model, transition, t, x, work.field, work.gradient)
     return abs(run.last_transversality) <= speed_rounding(model, run, transition, mode, t, x, work)
 

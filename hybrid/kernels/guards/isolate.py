@@ -189,7 +189,7 @@ def first_change(model, method, run, path, guard, hidden, work):
     ``NOWHERE`` if the guard does not change its sign before ``proved``; the step is to be cut to ``proved``.
     """
     length, stack, pieces, top, touch = path.length, work.intervals, 0, 0, NO_TOUCH
-    transition = guard.transition
+    transition, proved = guard.transition, True
     guard, leaves = _known_at_start(model, path, guard, hidden, work)
     # If the transition has just fired and its speed is uncertain, the step only shows to which side its guard
     # leaves zero.
@@ -211,7 +211,8 @@ def first_change(model, method, run, path, guard, hidden, work):
             if piece.low > SMALL_SHARE * length:
                 _noted(run, path, guard, touch)
                 return NOWHERE, side, piece.low
-            run.unproved += 0 if piece.clear else 1
+            if proved and not piece.clear:
+                run.unproved[transition], proved = run.unproved[transition] + 1, False
         turn, value, rounding, beyond = turn_on(model, path, guard, piece, work)
         if shallow and beyond and piece.low < turn < high:
             # The guard crosses zero and turns back: each side of the turn has one change of sign.

@@ -115,6 +115,16 @@ def _has_known_part(guard):
     return guard.base != 0.0 or guard.tilt != 0.0
 
 
+@njit(**INLINE)
+def _around_middle(bounds, radius):
+    """Bounds narrowed by the mean value theorem; a known part has been taken off values and slopes apart."""
+    low, high, least, most, low_middle, high_middle = bounds
+    reach = radius * max(abs(least), abs(most)) if radius > 0.0 else 0.0
+    reach += 2.0 * EPSILON * reach
+    low, high = max(low, low_middle - reach), min(high, high_middle + reach)
+    return Bounds(low, high, least, most, low_middle, high_middle)
+
+
 @njit(**KERNEL)
 def bounds_on(model, path, guard, low, high, work):
     """``Bounds`` of a guard, less its known part, between two places."""
@@ -125,7 +135,7 @@ def bounds_on(model, path, guard, low, high, work):
     else:
         bound_state(path, guard.column, middle, radius, work.registers[0])
     row = work.registers[last]
-    return Bounds(
+    bounds = Bounds(
         row[LOW] - (base + max(tilt * low, tilt * high)),
         row[HIGH] - (base + min(tilt * low, tilt * high)),
         row[LEAST_SLOPE] - tilt,
@@ -133,6 +143,7 @@ def bounds_on(model, path, guard, low, high, work):
         row[LOW_MIDDLE] - (base + tilt * middle),
         row[HIGH_MIDDLE] - (base + tilt * middle),
     )
+    return bounds if tilt == 0.0 else _around_middle(bounds, radius)
 
 
 @njit(**INLINE)

@@ -17,8 +17,8 @@ SAMPLES = 32
 @njit(**KERNEL)
 def sampled_change(model, run, path, guard, hidden, work):
     """As ``first_change``, for a guard that could not be traced: it is evaluated at some places only."""
-    run.unproved += 1
     transition, side, on_guard = guard.transition, guard.side, guard.on_guard
+    run.unproved[transition] += 1
     direction, length, low = model.direction[transition], path.length, hidden
     for i in range(1, SAMPLES + 1):
         high = hidden + (length - hidden) * i / SAMPLES

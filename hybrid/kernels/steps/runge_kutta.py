@@ -375,6 +375,7 @@ def runge_kutta_step(task, remaining):
             return STEP_TOO_SMALL, 0.0
         # Where the field ends at the guard, a landing may have no value: a shorter step comes nearer to it.
         if h == 0.0 if fired == NO_TRANSITION else is_lost(model, work):
+            restore_sides(model, run)
             return try_shorter(run, SHORTER * whole)
     if interpolated and fired == NO_TRANSITION and not follows(task, h, whole):
         if guarded:

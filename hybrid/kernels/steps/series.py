@@ -10,6 +10,7 @@ import math
 
 from numba import njit
 
+from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.columns import evaluate, evaluate_with_sizes, gather_tangents
 from hybrid.kernels.arithmetic.powers import power_of_two
@@ -61,6 +62,8 @@ SHORTER = 0.75
 MOST_SHORTER = 100
 # Shortest step, in units of the rounding of time.
 FINEST = 4.0 * EPSILON
+# A root that a step of its own clock does not bring to zero is no farther from it than this share of time.
+AT_ROOT = 64.0 * EPSILON
 # Largest correction of a landing, as a share of the step.
 CLOSE = 1e-8
 # A flight without end is followed for this many times the time in which the state changes by its size.
@@ -327,6 +330,28 @@ def land(model, run, tangents, fired, path, span, work):
 
 
 @njit(**KERNEL)
+def end_at_root(model, run, path, work):
+    """End a stay at a guard whose root vanishes, but never on its own clock; a code and the time it takes.
+
+    On the clock a root that goes to zero at a steady rate in time, as that of a tank without inflow, falls
+    exponentially. The guard is reached when the root at its pace needs less than the rounding of time.
+    """
+    mode, series, pace = run.mode, path.powers, path.powers[1, path.clock]
+    first, near = model.first_outgoing[mode], AT_ROOT * measured_time(model, run, mode)
+    for slot in range(first, model.first_outgoing[mode + 1]):
+        run.rehearsal[3, model.outgoing[slot]] = 0
+    for slot in range(first, model.first_outgoing[mode + 1]):
+        transition, column = model.outgoing[slot], model.dimension + slot - first
+        value, slope, side = series[0, column], series[1, column], run.side[transition]
+        ends = model.guard_in_series[transition] == 1 and crosses_towards(model.direction[transition], -side)
+        if ends and value * slope < 0.0 and pace * abs(value) <= near * abs(slope):
+            project_on_guard(model, run, transition, run.phase, work)
+            run.rehearsal[3, transition], run.pending = side, transition
+            return GO_ON, 0.0
+    return STEP_TOO_SMALL, 0.0
+
+
+@njit(**KERNEL)
 def series_step(task, remaining):
     """One step, to the first event on it or to the end of the run; returns a code and the step in time.
 
@@ -353,7 +378,7 @@ def series_step(task, remaining):
     span = time_taken(path, remaining, finest, cut or fired != NO_TRANSITION)
     stays = fired == NO_TRANSITION and not span > finest and span < remaining
     if stays and (model.timed[mode] == 1 or moves_nothing(model, run, series[1], path.length)):
-        return STEP_TOO_SMALL, 0.0
+        return end_at_root(model, run, path, work) if clock >= 0 else (STEP_TOO_SMALL, 0.0)
     if record.step_phase.shape[0] > 0 and span > 0.0:
         remember_series(model, run, record, path, span)
     accept_series(model, run, tangents, path, work)

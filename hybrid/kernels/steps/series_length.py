@@ -200,18 +200,15 @@ def is_regular(series, n, order, tolerance, last, growth, weights):
 def within_floats(series, columns, order, tolerance, weights):
     """The order up to which the terms of a series are normal floats, with what ``longest_step`` says of it.
 
-    Units of time far from the pace of the solution make the later terms overflow or vanish. Terms that vanish
-    in a low order, too, are those of a polynomial, and the order stays as it is.
+    Units of time far from the pace of the solution make the later terms overflow or vanish. The first terms
+    tell the pace. Later terms that vanish though their pace keeps them normal are those of a polynomial, and
+    so are first terms that vanish: the order stays as it is.
     """
-    least, highest = (TAIL_OF_EXACT if tolerance.exact else TAIL) + 1, order
-    h, last, growth = longest_step(series, columns, least, tolerance, weights)
-    if not least * abs(math.log2(h)) <= MOST_BITS:
-        h, last, growth = longest_step(series, columns, highest, tolerance, weights)
-        return highest, h, last, growth
-    while order > least:
-        h, last, growth = longest_step(series, columns, order, tolerance, weights)
-        most = int(MOST_BITS / abs(math.log2(h)))
-        if order <= most:
-            break
-        order = max(least, most)
+    least = (TAIL_OF_EXACT if tolerance.exact else TAIL) + 1
+    by_size = Tolerance(1.0, tolerance.atol, tolerance.exact)
+    pace, _, _ = longest_step(series, columns, least, by_size, weights)
+    bits = abs(math.log2(pace))
+    if least * bits <= MOST_BITS < order * bits:
+        order = int(MOST_BITS / bits)
+    h, last, growth = longest_step(series, columns, order, tolerance, weights)
     return order, h, last, growth

@@ -236,7 +236,6 @@ COUNTERS = (
     "last_kind",
     "locked",
     "map_is_known",
-    "unproved",
     "at_rest",
     "round",
     "stretch_steps",
@@ -296,6 +295,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
       guards before the crossings found on the last step.
     - ``passed (transitions,)``: the share of the last step at which each guard changed sides without firing
       before the crossing found on the step; then the middle between the two. ``NO_ROOT`` if it did not.
+    - ``unproved (transitions,)``: the number of steps on which the crossings of each guard are not proved.
     - ``tick (transitions,)``: the number of the next tick of each transition; ``ticked (transitions,)``: that
       of the first tick of a clock that has not fired anything yet. ``ticks`` are the numbers of all
       clocks, those of a transition from ``model.first_tick`` on: period and offset, or times, or a duration.
@@ -328,6 +328,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     recent: INDICES
     rehearsal: INDEX_MATRIX
     passed: VECTOR
+    unproved: INDICES
     visits: MATRIX
     tick: INDICES
     ticked: INDICES

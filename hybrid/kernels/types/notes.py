@@ -18,7 +18,9 @@ def is_plain(model, run, beyond):
     neither of a single run nor of many. ``beyond`` counts the guards that the start lies beyond. In doubt
     the answer is no.
     """
-    steps = run.unproved + run.unresolved + run.coarse
+    steps = run.unresolved + run.coarse
+    for transition in range(run.unproved.shape[0]):
+        steps += run.unproved[transition]
     held = 0
     for i in range(model.dimension):
         if run.trail[HELD, i] != 0.0:

@@ -312,6 +312,16 @@ def test_a_cycle_that_repeats(kind, declared):
         assert arc["q"][-1] == pytest.approx(2.0 * integral(cycle, 3.0), rel=1e-13)
 
 
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("kind", ["linear", "step"])
+def test_a_cycle_that_begins_at_its_end_and_is_read_backwards(kind, solver):
+    """The piece at the end of the cycle holds right behind the start of the run."""
+    cycle = Table([0.0, 1.0, 2.0, 5.0], [0.0, 3.0, -1.0, 0.5], kind=kind)
+    got = filled(lambda t, x, p: (cycle((-p.a * t) % 5.0),), 52.0, solver, a=1.0)
+    whole, last = integral(cycle, 5.0), integral(cycle, 5.0) - integral(cycle, 3.0)
+    assert got == pytest.approx(10.0 * whole + last, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     "argument",
     [

@@ -58,7 +58,7 @@ def crossing(coefficients, side, direction=0, on_guard=0, hidden=0.0):
     )
     run = SimpleNamespace(
         mode=0, y=np.zeros(1), scale=np.zeros(1), passed=[NO_ROOT], last_fired=-1, since_entry=1.0,
-        unproved=0, grazing_place=NO_ROOT, next_grazing=NO_ROOT,
+        unproved=np.zeros(1, int), grazing_place=NO_ROOT, next_grazing=NO_ROOT,
     )  # fmt: skip
     work = SimpleNamespace(
         state=np.zeros(1), scalar=np.zeros(1), gradient=np.zeros(2), registers=np.zeros((1, 6)),
@@ -66,7 +66,7 @@ def crossing(coefficients, side, direction=0, on_guard=0, hidden=0.0):
     )  # fmt: skip
     guard = Guard(0, 0, side, on_guard, 0.0, 0.0, 0.0)
     place, after, proved = kernels.first_change(model, None, run, path, guard, hidden, work)
-    assert (proved, run.unproved) == (1.0, 0)
+    assert (proved, run.unproved.sum()) == (1.0, 0)
     return place, after
 
 
