@@ -35,6 +35,8 @@ class Flow:
         Derivatives ``(n, n + k)`` of that in the start and the parameters, at fixed times.
     first_rate, last_rate
         The field ``(n,)`` at the two ends.
+    counters
+        Values of the counters at the end: jumps that accumulate within the stretch may have counted.
     """
 
     arc: HybridArc | None
@@ -42,6 +44,7 @@ class Flow:
     slopes: np.ndarray
     first_rate: np.ndarray
     last_rate: np.ndarray
+    counters: tuple[float, ...] = ()
 
     def at(self, shares: np.ndarray) -> np.ndarray:
         """States ``(N, n)`` at shares ``(N,)`` of the time."""
@@ -63,18 +66,14 @@ class Landing:
     slopes
         Derivatives ``(n, n + k + 1)`` of that in the state before, the parameters and the time.
     height, gradient
-        The guard of the first of them, and its derivatives ``(n + k + 1,)`` in the same.
-    parts
-        The jumps as those that move by themselves: each with what a jump sets off at its instant, as the
-        derivatives ``(n, n + k + 1)`` of the state after in that before, the gradient of its guard, and the
-        field after it ``(n,)``, None after the last.
+        The guard of the first of them, and its derivatives ``(n + k + 1,)`` in the same. The first sets off
+        all others.
     """
 
     after: np.ndarray
     slopes: np.ndarray
     height: float
     gradient: np.ndarray
-    parts: tuple[tuple[np.ndarray, np.ndarray, np.ndarray | None], ...]
 
 
 @attrs.frozen(eq=False)
@@ -104,6 +103,27 @@ class Pass:
         shares = np.linspace(0.0, 1.0, LOOKED_AT)
         states = [flow.at(shares) for flow in self.flows if flow.arc is not None]
         return np.asarray(np.abs(np.concatenate([self.loop.x, *states])).max(axis=0))
+
+    @property
+    def parted(self) -> Pass:
+        """The same orbit, with a stretch that takes no time between events that meet by themselves."""
+        family, loop = self.family, self.loop
+        stretches: list[Any] = []
+        states, times, flows = [], [], []
+        for i, (stretch, flow) in enumerate(zip(family.route, self.flows, strict=True)):
+            end = float(loop.times[i + 1])
+            parts = family.by_themselves(stretch, flow, end, loop.values, loop.period)
+            stretches += [each for each, _ in parts]
+            states += [loop.x[i], *(x for _, x in parts[1:])]
+            times += [loop.times[i], *([end] * (len(parts) - 1))]
+            flows += [flow, *(family.flow(each, x, end, end, loop.values) for each, x in parts[1:])]
+        family = attrs.evolve(family, route=tuple(stretches))
+        loop = Loop(np.array(states), np.array([*times, loop.times[-1]]), loop.values)
+        landings = tuple(
+            family.landing(stretch, flow, float(t), loop.values)
+            for stretch, flow, t in zip(stretches, flows, loop.times[1:], strict=True)
+        )
+        return Pass(family, loop, tuple(flows), landings)
 
     def units(self, sizes: np.ndarray) -> np.ndarray:
         """Units of the unknowns, for parameters of the ``sizes (k,)``.
@@ -147,15 +167,11 @@ class Pass:
             if landing is None:
                 found.append(np.eye(n))
                 continue
-            product, before = np.eye(n), flow.last_rate
-            for moved, gradient, rate in landing.parts:
-                after = self.flows[(i + 1) % len(self.flows)].first_rate if rate is None else rate
-                late = after - moved[:, :n] @ before - moved[:, -1]
-                with np.errstate(all="ignore"):
-                    speed = gradient[:n] @ before + gradient[-1]
-                    product = (moved[:, :n] + np.outer(late, gradient[:n]) / speed) @ product
-                before = after
-            found.append(product)
+            before, after = flow.last_rate, self.flows[(i + 1) % len(self.flows)].first_rate
+            late = after - landing.slopes[:, :n] @ before - landing.slopes[:, -1]
+            with np.errstate(all="ignore"):
+                moved = np.outer(late, landing.gradient[:n]) / self.speed(i)
+            found.append(landing.slopes[:, :n] + moved)
         return found
 
     @cached_property
