@@ -306,14 +306,17 @@ def refined(place: Place) -> Place:
 
 
 def share_of(orbit: Pass, t: float) -> tuple[int, float]:
-    """The stretch at a time, whole periods aside, and the share of the stretch before it."""
-    times = orbit.loop.times
-    after = (t - times[0]) % orbit.loop.period
-    # The end of the last stretch is the begin of the first one: what is this near to it is there.
-    t = times[0] + (after if after < (1.0 - CLOSED) * orbit.loop.period else 0.0)
-    i = min(max(int(np.searchsorted(times, t, side="right")) - 1, 0), len(times) - 2)
-    length = times[i + 1] - times[i]
-    return i, float((t - times[i]) / length) if length > 0.0 else 0.0
+    """The stretch at a time, whole periods aside, and the share of the stretch before it.
+
+    What is no farther than rounding from the end of a stretch is at the begin of the next one, after the jumps:
+    the state before them need not be a start, since a clock does not tick at the start of a run.
+    """
+    times, period = orbit.loop.times, orbit.loop.period
+    least = CLOSED * period
+    after = (t - times[0]) % period
+    t = times[0] + (after if after < period - least else 0.0)
+    i = min(max(int(np.searchsorted(times, t + least, side="right")) - 1, 0), len(times) - 2)
+    return i, float((t - times[i]) / (times[i + 1] - times[i])) if t > times[i] + least else 0.0
 
 
 def moment(orbit: Pass, i: int, share: float) -> tuple[float, np.ndarray]:

@@ -28,14 +28,15 @@ ANY, POSITIVE, UNIT = (-2.7, 2.9), (0.2, 3.0), (-0.999, 0.998)
 # Analytic functions, and where their arguments are.
 ANALYTIC = {
     **dict.fromkeys((ops.Exp, ops.Expm1, ops.Exp2, ops.Sin, ops.Cos, ops.Sinh, ops.Cosh, ops.Tanh), (ANY,)),
-    **dict.fromkeys((ops.Arctan, ops.Arcsinh), (ANY,)),
+    **dict.fromkeys((ops.Arctan, ops.Arcsinh, ops.Erf, ops.Erfc), (ANY,)),
     **dict.fromkeys((ops.Log, ops.Log2, ops.Log10), (POSITIVE,)),
     **dict.fromkeys((ops.Arcsin, ops.Arccos, ops.Arctanh, ops.Log1p, ops.Tan), (UNIT,)),
     ops.Arccosh: ((1.1, 3.0),),
     ops.Hypot: (POSITIVE, ANY),
 }
 # Functions with kinks or jumps, which have no series.
-OF_ONE = (ops.Floor, ops.Level, ops.Ceiling, ops.Truncate, ops.Sign, ops.Step, ops.Absolute, ops.Not)
+ROUNDING = (ops.Floor, ops.Level, ops.Ceiling, ops.Truncate, ops.Round)
+OF_ONE = (*ROUNDING, ops.Sign, ops.Step, ops.Absolute, ops.Not)
 OTHERS = {
     **dict.fromkeys((*OF_ONE, ops.CubeRoot), (ANY,)),
     **dict.fromkeys((ops.Less, ops.LessEqual, ops.Equal, ops.And, ops.Or, ops.Atan2), (ANY, ANY)),

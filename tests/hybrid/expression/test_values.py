@@ -137,8 +137,7 @@ def test_a_sum_of_booleans_is_a_boolean_and_the_sum_of_a_list_counts_them(functi
         (lambda x: (x[0] > 0) & 2, r"join conditions: write \(x.q > 0\) & \(x.v > 0\)"),
         (lambda x: x[x > 0], r"write np.where\(x > 0, x, 0\) in place of x\[x > 0\]"),
         (lambda x: _added(np.zeros(4), x), r"use np.zeros_like\(x\) in place of np.zeros"),
-        (lambda x: round(x[0]), r"use np.floor\(x \+ 0.5\)"),
-        (lambda x: np.round(x), r"np.rint cannot be traced: write np.floor\(x \+ 0.5\)"),
+        (lambda x: math.erf(x[0]), r"scipy.special.erf in place of math.erf"),
         (lambda x: math.floor(x[0]), r"use np.floor\(x\)"),
         (lambda x: np.logaddexp(0.0, x[0]), r"write np.log\(np.exp\(a\) \+ np.exp\(b\)\)"),
     ],
@@ -163,6 +162,26 @@ def test_entries_that_a_condition_picks_may_be_set():
     expressions = trace(lambda t, x, p: clipped(x), 4, ())
     for x in POINTS:
         np.testing.assert_array_equal(values_of(expressions, x), clipped(x))
+
+
+@pytest.mark.parametrize(
+    "rounded",
+    [
+        np.rint,
+        np.round,
+        np.around,
+        round,
+        lambda z: round(z, 2),
+        lambda z: np.round(z, 1),
+        lambda z: np.round(z, -1),
+        lambda z: np.round(z, decimals=3),
+        lambda z: np.round(np.array([z, 2 * z]), 1)[1],
+    ],
+)
+def test_numbers_are_rounded_as_numpy_rounds_half_to_even(rounded):
+    [expression] = trace(lambda t, x, p: (rounded(x[0]),), 1, ())
+    for z in (-3.5, -2.5, -0.5, 0.5, 1.5, 2.5, 0.125, 14.9, 15.0, 25.0, 1e17, -0.2):
+        assert values_of([expression], (z,))[0] == rounded(np.float64(z))
 
 
 @pytest.mark.parametrize("divisor", [0.1, 0.3, -0.7, 3.0, 1e-3, math.inf, -math.inf])

@@ -13,7 +13,8 @@ from hybrid.kernels.arithmetic import intervals
 from hybrid.kernels.arithmetic import operations as op
 
 _range, _slope = intervals.range_of, intervals.slope_of
-_product, _quotient, _whole, _fixed = (
+_added, _product, _quotient, _whole, _fixed = (
+    intervals.added,
     intervals.product,
     intervals.quotient,
     intervals.whole_power,
@@ -32,6 +33,11 @@ def bounds(code, low, high):
 @njit
 def product(a, b, c, d):
     return _product(a, b, c, d)
+
+
+@njit
+def added(a, b, c, d):
+    return _added(a, b, c, d)
 
 
 @njit
@@ -88,6 +94,9 @@ FUNCTIONS = {
     op.FLOOR: (math.floor, None),
     op.CEILING: (math.ceil, None),
     op.TRUNCATE: (math.trunc, None),
+    op.ROUND: (round, None),
+    op.ERF: (math.erf, lambda u: 2.0 / math.sqrt(math.pi) * math.exp(-u * u)),
+    op.ERFC: (math.erfc, lambda u: -2.0 / math.sqrt(math.pi) * math.exp(-u * u)),
     op.SIGN: (lambda u: float(np.sign(u)), None),
     op.STEP: (lambda u: float(np.heaviside(u, 0.5)), None),
     op.NOT: (lambda u: float(not u), None),
@@ -235,6 +244,7 @@ EXACT = {
     op.ACOSH: (mpmath.acosh, 1.1, 9.0), op.ATANH: (mpmath.atanh, -1.0, 1.0),
     op.LOG1P: (mpmath.log1p, -0.9, 9.0),
     op.EXPM1: (mpmath.expm1, -6.0, 6.0),
+    op.ERF: (mpmath.erf, -3.0, 3.0), op.ERFC: (mpmath.erfc, -3.0, 6.0),
 }  # fmt: skip
 
 
@@ -406,6 +416,18 @@ def test_exact_zeros_stay_exact():
     assert product(0.0, 0.0, -math.inf, math.inf) == (0.0, 0.0)
     assert bounds(op.ABSOLUTE, -1.0, 2.0) == (0.0, 2.0, -1.0, 1.0)
     assert whole_power(-1e-9, 1e-9, 3)[0] < 0.0 < whole_power(-1e-9, 1e-9, 3)[1]
+
+
+def test_arithmetic_on_whole_numbers_has_no_rounding():
+    """So a floor, or a comparison, of what was computed from whole numbers is certain."""
+    for a, b in [(3.0, 7.0), (-12.0, 4.0), (0.5, 6.0), (1e6, 9.0)]:
+        assert product(a, a, b, b) == (a * b, a * b)
+        assert quotient(a * b, a * b, b, b) == (a, a)
+        assert added(a, a, b, b) == (a + b, a + b)
+    assert product(1.0, 2.0, -3.0, 5.0) == (-6.0, 10.0)
+    assert added(1.0, 2.0, -3.0, 5.0) == (-2.0, 7.0)
+    for least, most in [quotient(1.0, 1.0, 3.0, 3.0), product(0.1, 0.1, 3.0, 3.0), added(0.1, 0.1, 0.2, 0.2)]:
+        assert least < most
 
 
 def test_what_may_jump_has_a_slope_without_bound():
