@@ -149,12 +149,21 @@ class PeriodicOrbit:
 
     def arc(self, solver: Solver | None = None) -> HybridArc:
         """The orbit over one period; if it jumps at its point, from just after these jumps."""
-        after = self.t0 + max(MOMENT * self.period, ROUNDING_OF_TIME * math.ulp(abs(self.t0) + self.period))
-        start = self._run(self.x0, self.t0, after, self.mode, solver)
-        if len(start.jumps) == 0 or not start.status.ok:
-            return self._run(self.x0, self.t0, self.t0 + self.period, self.mode, solver)
-        # The same jumps come just before the end.
-        return self._run(start.x[-1], after, after + self.period, str(start.mode[-1]), solver)
+        start, end = self._first_moment(solver), self.t0 + self.period
+        after = float(start.t[-1])
+        arc = self._run(start.x[-1], after, after + self.period, str(start.mode[-1]), solver)
+        # Rounding may put a jump at the point to either side of the end.
+        jumps = len(start.jumps) > 0 or bool(np.any(np.abs(arc.jumps.t - end) <= after - self.t0))
+        return arc if jumps and start.status.ok else self._run(self.x0, self.t0, end, self.mode, solver)
+
+    def first_jumps(self) -> list[str]:
+        """Names of the transitions that a run from the point makes at once."""
+        return [str(name) for name in self._first_moment(None).jumps.transition]
+
+    def _first_moment(self, solver: Solver | None) -> HybridArc:
+        """A run from the point that is clear of the guards of jumps there at its end."""
+        least = ROUNDING_OF_TIME * math.ulp(abs(self.t0) + self.period)
+        return self._run(self.x0, self.t0, self.t0 + max(MOMENT * self.period, least), self.mode, solver)
 
     def _run(self, x: np.ndarray, t: float, end: float, mode: str, solver: Solver | None) -> HybridArc:
         return simulate(self.system, x, (t, end), mode=mode, parameters=self.parameters, solver=solver)

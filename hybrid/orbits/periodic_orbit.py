@@ -116,7 +116,7 @@ def periodic_orbit(
         compile_system(system)
         _check_clocks(system, state, parameters, t0, point.period)
         with CTRL_C:
-            return _shown(shooting.hinted(shooting.newton(point, False, tolerance, max_iterations), point))
+            return _shown(shooting.hinted(shooting.forced(point, tolerance, max_iterations), point))
     ticking = [each.name for each in system.transitions if each.clock and not each.clock.counts_from_entry]
     if ticking:
         raise ArgumentError(

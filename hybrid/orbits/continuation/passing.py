@@ -181,10 +181,11 @@ class Pass:
         pairs = zip(self.saltations, self.flows, strict=True)
         found = [saltation @ flow.slopes[:, :n] for saltation, flow in pairs]
         if all(landing is None for landing in self.landings):
-            found[-1] = self._onto_its_surface() @ found[-1]
+            found[-1] = self.onto_its_surface @ found[-1]
         return found
 
-    def _onto_its_surface(self) -> np.ndarray:
+    @property
+    def onto_its_surface(self) -> np.ndarray:
         """The projection ``(n, n)`` onto the surface that an orbit without jumps stays on; else the identity.
 
         Other orbits come to such a surface by a jump, which forgets how far they were from it.

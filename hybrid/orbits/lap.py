@@ -1,0 +1,205 @@
+"""One lap around an orbit, as a run of the system shows it, stretch by stretch.
+
+The stretches are those that a branch follows: `hybrid.orbits.continuation.passing` holds their equations and
+saltation matrices. The tangent map of each stretch is known as well-conditioned factors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import attrs
+import numpy as np
+
+from hybrid.kernels.types import codes
+from hybrid.orbits.continuation.family import Family
+from hybrid.orbits.continuation.passing import Flow, Pass
+from hybrid.orbits.continuation.route import Loop, Stretch
+from hybrid.orbits.factors import MOST_ATTEMPTS, OTHER_UNITS, Products, suited
+from hybrid.orbits.periodic_schur import ProductEigenvalues, product_eigenvalues
+from hybrid.simulation.periods import split_time
+from hybrid.simulation.trajectory import Trajectory
+
+
+@attrs.frozen(eq=False)
+class Leg:
+    """The motion up to the next jump that does not accumulate with others, or to a place where it is cut.
+
+    ``x`` and ``end`` are whole states, ``factors`` those of its tangent map in the units of the lap.
+    ``singular`` says that the jumps at its end annihilate a direction.
+    """
+
+    mode: str
+    t: float
+    x: np.ndarray
+    first_rate: np.ndarray
+    factors: list[np.ndarray] = attrs.field(factory=list)
+    end_mode: str = ""
+    end_time: float = np.nan
+    end: np.ndarray = attrs.field(factory=lambda: np.zeros(0))
+    last_rate: np.ndarray = attrs.field(factory=lambda: np.zeros(0))
+    within: tuple[str, ...] = ()
+    fired: tuple[str, ...] = ()
+    singular: bool = False
+
+
+@attrs.frozen(eq=False)
+class Lap:
+    """A lap: its stretches as a pass, and the tangent map of each stretch and of each instant as factors.
+
+    ``orbit`` is None where the run did not come around. ``maps`` are the factors by stretches, in ``units
+    (n,)`` of the states, the jumps at the end of a stretch last; ``singular`` tells which of them annihilate a
+    direction.
+    """
+
+    orbit: Pass | None
+    units: np.ndarray
+    maps: tuple[list[np.ndarray], ...] = ()
+    singular: tuple[list[bool], ...] = ()
+
+    @property
+    def eigenvalues(self) -> ProductEigenvalues:
+        """The multipliers; nan where there are none."""
+        factors = [each for maps in self.maps for each in maps]
+        if not factors or not all(np.all(np.isfinite(each)) for each in factors):
+            unknown = np.full(len(self.units), np.nan)
+            return ProductEigenvalues(unknown, unknown.astype(complex))
+        known = [each for flags in self.singular for each in flags]
+        return product_eigenvalues(factors, {i for i, each in enumerate(known) if each})
+
+    def fundamental(self, i: int, *, before: bool = False) -> np.ndarray:
+        """The fundamental matrix ``(n, n)`` from the start of a stretch, or from before the jumps there."""
+        maps = [*self.maps[i:], *self.maps[:i]]
+        product = np.eye(len(self.units)) if maps else np.full((len(self.units),) * 2, np.nan)
+        factors = [each for stretch in maps for each in stretch]
+        if before:
+            factors = [factors[-1], *factors[:-1]]
+        with np.errstate(all="ignore"):
+            for each in factors:
+                product = each @ product
+            return product * self.units[:, None] / self.units
+
+
+def lap_of(
+    family: Family,
+    begin: Callable[[], Trajectory],
+    stops: Sequence[float],
+    accumulating: tuple[str, ...] = (),
+) -> Lap:
+    """The lap of a run up to the last of some times; at each of the others a stretch is cut.
+
+    Jumps of the transitions in ``accumulating`` are within a stretch, but for the first of a row of them.
+    """
+    units = np.ones(family.n)
+    for _ in range(MOST_ATTEMPTS):
+        flight = _Flight(begin(), accumulating, units)
+        if any(flight.to(t) != codes.DONE for t in stops):
+            return Lap(None, units)
+        better = suited(units, np.asarray(flight.sizes))
+        change = better / units
+        if change.max() <= OTHER_UNITS * change.min():
+            break
+        units = better
+    try:
+        return _measured(family, flight.legs, units)
+    except ArithmeticError:
+        return Lap(None, units)
+
+
+@attrs.define(eq=False)
+class _Flight:
+    """A run of the system that is cut into legs."""
+
+    trajectory: Trajectory
+    accumulating: tuple[str, ...]
+    units: np.ndarray
+    legs: list[Leg] = attrs.field(factory=list)
+    sizes: np.ndarray | float = 0.0
+    # Whether the jump before may be the first of those that accumulate.
+    begun: bool = False
+
+    def to(self, t: float) -> int:
+        """Make the legs up to a time; DONE, or why the run ends early."""
+        run, n = self.trajectory, len(self.units)
+        place = split_time(t, run.model.period)
+        code = codes.MAX_STEPS
+        while code == codes.MAX_STEPS:
+            products = Products(run, self.units)
+            leg = Leg(run.mode, run.t, run.x, run.field()[:n])
+            while True:
+                code = products.fly(place)
+                leg = attrs.evolve(
+                    leg,
+                    end_mode=run.mode,
+                    end_time=run.t,
+                    end=run.x,
+                    last_rate=run.field()[:n],
+                    factors=products.factors,
+                )
+                if code != codes.MAX_JUMPS:
+                    break
+                jumps = run.jumps
+                code = products.jump(place)
+                fired = self._fired(jumps)
+                if fired and not self._accumulates(fired):
+                    singular = len(products.matrices) - 1 in products.singular
+                    leg = attrs.evolve(leg, fired=fired, singular=singular)
+                    break
+                if code != codes.MAX_STEPS:
+                    break
+                leg = attrs.evolve(leg, within=self.accumulating if fired else leg.within)
+            self.sizes = self.sizes + products.all_sizes
+            self.legs.append(leg)
+        return code
+
+    def _fired(self, jumps: int) -> tuple[str, ...]:
+        """Names of the transitions that have fired after so many jumps."""
+        run = self.trajectory
+        recent, names = run.run.recent, run.system.transition_names
+        return tuple(names[recent[j % len(recent)]] for j in range(jumps, run.jumps))
+
+    def _accumulates(self, fired: tuple[str, ...]) -> bool:
+        """Whether jumps just made accumulate with others; the first of them is an ordinary jump."""
+        if self.trajectory.run.last_kind == codes.LIMIT_OF_CHATTER:
+            return True
+        accumulates = fired[0] in self.accumulating
+        if accumulates and self.begun:
+            return True
+        self.begun = accumulates
+        return False
+
+
+def _measured(family: Family, legs: list[Leg], units: np.ndarray) -> Lap:
+    """The lap of these legs."""
+    n, no_values = family.n, np.zeros(0)
+    route = tuple(
+        Stretch(leg.mode, leg.end_mode, leg.within, leg.fired, tuple(leg.x[n:].tolist())) for leg in legs
+    )
+    loop = Loop(
+        np.array([leg.x[:n] for leg in legs]),
+        np.array([legs[0].t, *(leg.end_time for leg in legs)]),
+        no_values,
+    )
+    flows = []
+    for leg in legs:
+        slopes = np.eye(n)
+        for each in leg.factors:
+            slopes = each @ slopes
+        slopes = slopes * units[:, None] / units
+        flows.append(Flow(None, leg.end[:n], slopes, leg.first_rate, leg.last_rate, tuple(leg.end[n:].tolist())))
+    counted = (legs[-1].end - legs[0].x)[n:]
+    family = attrs.evolve(family, route=route, counted=counted)
+    orbit = Pass(family, loop, tuple(flows), (None,) * len(legs)).parted
+    found = {id(flow): leg for flow, leg in zip(flows, legs, strict=True)}
+    maps, singular, leg = list[list[np.ndarray]](), list[list[bool]](), legs[0]
+    for flow, landing, saltation in zip(orbit.flows, orbit.landings, orbit.saltations, strict=True):
+        leg = found.get(id(flow), leg)
+        maps.append([*leg.factors] if id(flow) in found else [])
+        singular.append([False] * len(maps[-1]))
+        if landing is not None:
+            maps[-1].append(saltation / units[:, None] * units)
+            singular[-1].append(leg.singular)
+    if all(landing is None for landing in orbit.landings):
+        maps[-1].append(orbit.onto_its_surface / units[:, None] * units)
+        singular[-1].append(True)
+    return Lap(orbit, units, tuple(maps), tuple(singular))
