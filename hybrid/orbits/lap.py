@@ -33,11 +33,11 @@ class Leg:
     t: float
     x: np.ndarray
     first_rate: np.ndarray
-    factors: list[np.ndarray] = attrs.field(factory=list)
-    end_mode: str = ""
-    end_time: float = np.nan
-    end: np.ndarray = attrs.field(factory=lambda: np.zeros(0))
-    last_rate: np.ndarray = attrs.field(factory=lambda: np.zeros(0))
+    factors: list[np.ndarray]
+    end_mode: str
+    end_time: float
+    end: np.ndarray
+    last_rate: np.ndarray
     within: tuple[str, ...] = ()
     fired: tuple[str, ...] = ()
     singular: bool = False
@@ -120,37 +120,37 @@ class _Flight:
 
     def to(self, t: float) -> int:
         """Make the legs up to a time; DONE, or why the run ends early."""
-        run, n = self.trajectory, len(self.units)
-        place = split_time(t, run.model.period)
-        code = codes.MAX_STEPS
-        while code == codes.MAX_STEPS:
-            products = Products(run, self.units)
-            leg = Leg(run.mode, run.t, run.x, run.field()[:n])
-            while True:
-                code = products.fly(place)
-                leg = attrs.evolve(
-                    leg,
-                    end_mode=run.mode,
-                    end_time=run.t,
-                    end=run.x,
-                    last_rate=run.field()[:n],
-                    factors=products.factors,
-                )
-                if code != codes.MAX_JUMPS:
-                    break
-                jumps = run.jumps
-                code = products.jump(place)
-                fired = self._fired(jumps)
-                if fired and not self._accumulates(fired):
-                    singular = len(products.matrices) - 1 in products.singular
-                    leg = attrs.evolve(leg, fired=fired, singular=singular)
-                    break
-                if code != codes.MAX_STEPS:
-                    break
-                leg = attrs.evolve(leg, within=self.accumulating if fired else leg.within)
-            self.sizes = self.sizes + products.all_sizes
+        place = split_time(t, self.trajectory.model.period)
+        while True:
+            leg, code = self._leg(place)
+            if leg is None:
+                return code
             self.legs.append(leg)
-        return code
+            if code == codes.DONE:
+                return code
+
+    def _leg(self, place: tuple[int, float]) -> tuple[Leg | None, int]:
+        """The next leg, None if the run ends early; with DONE at the place."""
+        run, n = self.trajectory, len(self.units)
+        products = Products(run, self.units)
+        begin, within = (run.mode, run.t, run.x, run.field()[:n]), ()
+        while True:
+            code = products.fly(place)
+            if code not in (codes.DONE, codes.MAX_JUMPS):
+                return None, code
+            leg = Leg(*begin, products.factors, run.mode, run.t, run.x, run.field()[:n], within)
+            jumps, sizes = run.jumps, products.all_sizes
+            if code == codes.MAX_JUMPS:
+                code = products.jump(place)
+                if code not in (codes.DONE, codes.MAX_STEPS):
+                    return None, code
+            fired = self._fired(jumps)
+            if fired and self._accumulates(fired):
+                within = self.accumulating
+            elif fired or code == codes.DONE:
+                self.sizes = self.sizes + sizes
+                singular = len(products.matrices) - 1 in products.singular
+                return attrs.evolve(leg, fired=fired, singular=bool(fired) and singular), code
 
     def _fired(self, jumps: int) -> tuple[str, ...]:
         """Names of the transitions that have fired after so many jumps."""
