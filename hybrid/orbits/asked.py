@@ -8,10 +8,9 @@ import attrs
 import numpy as np
 
 from hybrid.orbits.continuation.passing import CLOSED
-from hybrid.orbits.lap import Lap
+from hybrid.orbits.lap import Fired, Lap
 from hybrid.orbits.newton import Point, Shot
 from hybrid.orbits.orbit import PeriodicOrbit
-from hybrid.simulation.jumps import Jump
 from hybrid.system.periodicity import whole_turns
 
 
@@ -32,7 +31,7 @@ class Asked:
         """Whether a time is the same but for rounding."""
         return abs(t - self.t) <= CLOSED * self.point.period
 
-    def answered(self, orbit: PeriodicOrbit, lap: Lap, jumps: Sequence[Jump], shot: Shot) -> PeriodicOrbit:
+    def answered(self, orbit: PeriodicOrbit, lap: Lap, jumps: Sequence[Fired], shot: Shot) -> PeriodicOrbit:
         """The orbit from its point at the time that was asked for.
 
         If the orbit jumps there, the point is the state before the jumps or the state after them, whichever is
@@ -62,7 +61,7 @@ class Asked:
         return before if apart[0] < apart[1] and before.first_jumps() == met else after
 
     def _from(
-        self, orbit: PeriodicOrbit, x: np.ndarray, mode: str, jumps: Sequence[Jump], *, first: bool
+        self, orbit: PeriodicOrbit, x: np.ndarray, mode: str, jumps: Sequence[Fired], *, first: bool
     ) -> PeriodicOrbit:
         """The orbit from a state; the jumps there come ``first``, or last."""
         early = [jump for jump in jumps if jump.t > self.t and not self.is_at(jump.t)]

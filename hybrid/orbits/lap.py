@@ -12,11 +12,12 @@ import attrs
 import numpy as np
 
 from hybrid.kernels.types import codes
-from hybrid.orbits.continuation.family import Family
-from hybrid.orbits.continuation.passing import Flow, Pass
+from hybrid.orbits.continuation.family import Family, no_time
+from hybrid.orbits.continuation.passing import CLOSED, Flow, Pass
 from hybrid.orbits.continuation.route import Loop, Stretch
 from hybrid.orbits.factors import MOST_ATTEMPTS, OTHER_UNITS, Products, suited
 from hybrid.orbits.periodic_schur import ProductEigenvalues, product_eigenvalues
+from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.periods import split_time
 from hybrid.simulation.trajectory import Trajectory
 
@@ -43,6 +44,15 @@ class Leg:
     singular: bool = False
 
 
+@attrs.frozen
+class Fired:
+    """A jump of an orbit: when, which transition, and the mode after it."""
+
+    t: float
+    transition: str
+    target: str | None
+
+
 @attrs.frozen(eq=False)
 class Lap:
     """A lap: its stretches as a pass, and the tangent map of each stretch and of each instant as factors.
@@ -54,8 +64,41 @@ class Lap:
 
     orbit: Pass | None
     units: np.ndarray
+    legs: tuple[Leg, ...] = ()
     maps: tuple[list[np.ndarray], ...] = ()
     singular: tuple[list[bool], ...] = ()
+
+    def in_order_of(self, arc: HybridArc) -> Lap:
+        """The lap with the events of each instant in the order in which another run around meets them.
+
+        Rounding decides the order of events that meet by themselves.
+        """
+        if self.orbit is None:
+            return self
+        legs, period, family = list(self.legs), self.orbit.loop.period, self.orbit.family
+        for i, leg in enumerate(legs):
+            late = (arc.jumps.t - leg.end_time + 0.5 * period) % period - 0.5 * period
+            here = np.flatnonzero(np.abs(late) <= CLOSED * period)
+            jumps = [arc.jumps[int(k)] for k in here]
+            if len(jumps) < 2 or len(leg.fired) < 2 or leg.within:
+                continue
+            if (jumps[0].source, jumps[-1].target) == (leg.end_mode, legs[(i + 1) % len(legs)].mode):
+                legs[i] = attrs.evolve(leg, fired=tuple(jump.transition for jump in jumps))
+        if all(one.fired == other.fired for one, other in zip(legs, self.legs, strict=True)):
+            return self
+        return _measured(family, legs, self.units)
+
+    @property
+    def jumps(self) -> list[Fired] | None:
+        """The jumps in their order; None where the run did not come around, or where jumps accumulate."""
+        if self.orbit is None or any(stretch.within for stretch in self.orbit.family.route):
+            return None
+        system, ends = self.orbit.family.system, self.orbit.loop.times[1:].tolist()
+        return [
+            Fired(t, name, system.transitions[system.transition_index(name)].target)
+            for t, stretch in zip(ends, self.orbit.family.route, strict=True)
+            for name in stretch.fired
+        ]
 
     @property
     def eigenvalues(self) -> ProductEigenvalues:
@@ -101,7 +144,7 @@ def lap_of(
             break
         units = better
     try:
-        return _measured(family, flight.legs, units)
+        return _measured(family, _joined(flight.legs), units)
     except ArithmeticError:
         return Lap(None, units)
 
@@ -169,6 +212,18 @@ class _Flight:
         return False
 
 
+def _joined(legs: list[Leg]) -> list[Leg]:
+    """The legs without those that take no time but for rounding: the jumps at their ends are of one instant."""
+    found: list[Leg] = []
+    for leg in legs:
+        if found and found[-1].fired and no_time(leg.t, leg.end_time):
+            fired, singular = (*found[-1].fired, *leg.fired), found[-1].singular or leg.singular
+            found[-1] = attrs.evolve(found[-1], fired=fired, singular=singular)
+        else:
+            found.append(leg)
+    return found
+
+
 def _measured(family: Family, legs: list[Leg], units: np.ndarray) -> Lap:
     """The lap of these legs."""
     n, no_values = family.n, np.zeros(0)
@@ -202,4 +257,4 @@ def _measured(family: Family, legs: list[Leg], units: np.ndarray) -> Lap:
     if all(landing is None for landing in orbit.landings):
         maps[-1].append(orbit.onto_its_surface / units[:, None] * units)
         singular[-1].append(True)
-    return Lap(orbit, units, tuple(maps), tuple(singular))
+    return Lap(orbit, units, tuple(legs), tuple(maps), tuple(singular))

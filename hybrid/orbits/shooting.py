@@ -10,15 +10,15 @@ import numpy as np
 from hybrid.errors import ArgumentError
 from hybrid.orbits.asked import Asked
 from hybrid.orbits.continuation.family import Family
+from hybrid.orbits.continuation.order import order_status
 from hybrid.orbits.continuation.route import accumulating
 from hybrid.orbits.held import Held, held_by
-from hybrid.orbits.lap import Lap, lap_of
+from hybrid.orbits.lap import Fired, Lap, lap_of
 from hybrid.orbits.newton import ROUNDING_OF_GAP, Newton, Point, Shot, length
 from hybrid.orbits.orbit import PeriodicOrbit, turns_over
 from hybrid.orbits.rest import EPSILON, drift
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.ending import status_of
-from hybrid.simulation.jumps import Jump
 from hybrid.simulation.simulate import simulate
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
@@ -332,10 +332,20 @@ class Shooting:
 
     def _result(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> PeriodicOrbit:
         lap, jumps = self._lap(shot)
+        orbit = self._around(lap, lap.jumps or jumps, shot)
+        if orbit.status.ok:
+            lap = lap.in_order_of(orbit.arc())
+            orbit = self._around(lap, lap.jumps or jumps, shot)
         status = self._status(shot, newton, iterations, tolerance)
-        eigenvalues = lap.eigenvalues
         if status.ok:
-            status = self._explained(status, shot, newton, eigenvalues.values)
+            status = self._explained(status, shot, newton, orbit.multipliers)
+        if status.ok and lap.orbit is not None:
+            status = order_status(lap.orbit) or status
+        return attrs.evolve(orbit, iterations=iterations, status=status)
+
+    def _around(self, lap: Lap, jumps: list[Fired], shot: Shot) -> PeriodicOrbit:
+        """A lap as an orbit, from the point that was asked for."""
+        eigenvalues = lap.eigenvalues
         orbit = PeriodicOrbit(
             system=self.system,
             parameters=self._all_parameters(),
@@ -347,19 +357,19 @@ class Shooting:
             log_moduli=eigenvalues.log_moduli,
             fundamental=lap.fundamental(0),
             residual=length(shot.gap),
-            iterations=iterations,
+            iterations=0,
             signature=(shot.mode, *(jump.target for jump in jumps if jump.target is not None)),
             transitions=tuple(jump.transition for jump in jumps),
-            status=status,
+            status=shot.status,
             turns=turns_over(self.system, shot.end - shot.point.x),
         )
         if self.asked is None or lap.orbit is None:
             return orbit
         return self.asked.answered(orbit, lap, jumps, shot)
 
-    def _lap(self, shot: Shot) -> tuple[Lap, list[Jump]]:
+    def _lap(self, shot: Shot) -> tuple[Lap, list[Fired]]:
         """The run over the period, stretch by stretch and cut at the time of the guess, and its jumps."""
-        point, jumps = shot.point, list(self._follow(shot.point, shot.point.period, shot.mode).jumps)
+        point, jumps = shot.point, self._follow(shot.point, shot.point.period, shot.mode).jumps
         stops = [point.t + point.period]
         if self.asked is not None and not any(self.asked.is_at(jump.t) for jump in jumps):
             stops = [self.asked.t, *stops]
@@ -367,7 +377,8 @@ class Shooting:
         family = Family(
             self.system, (), self._all_parameters(), periods, self.solver, (), least=shot.magnitude
         )
-        return lap_of(family, lambda: self._trajectory(point, shot.mode), stops, accumulating(jumps)), jumps
+        lap = lap_of(family, lambda: self._trajectory(point, shot.mode), stops, accumulating(jumps))
+        return lap, [Fired(jump.t, jump.transition, jump.target) for jump in jumps]
 
     def _all_parameters(self) -> dict[str, float]:
         values = self.system.parameter_values(self.parameters).tolist()

@@ -186,7 +186,7 @@ class Family:
         mode = self.extended.mode_index(stretch.mode)
         last_mode = self.extended.mode_index(stretch.end_mode)
         first_rate = self._rate(mode, begin, state)
-        if abs(end - begin) <= ULPS * math.ulp(max(abs(begin), abs(end))):
+        if no_time(begin, end):
             last_rate = self._rate(last_mode, end, state)
             moved = x + (end - begin) * first_rate
             return Flow(None, moved, np.eye(n, n + len(values)), first_rate, last_rate, stretch.counters)
@@ -309,6 +309,11 @@ class Family:
             )
         except ArgumentError as error:
             raise ArithmeticError from error
+
+
+def no_time(begin: float, end: float) -> bool:
+    """Whether two times are the same but for rounding."""
+    return abs(end - begin) <= ULPS * math.ulp(max(abs(begin), abs(end)))
 
 
 def _after(slopes: np.ndarray, before: np.ndarray) -> np.ndarray:
