@@ -13,7 +13,7 @@ import numpy as np
 
 from hybrid.kernels.types import codes
 from hybrid.orbits.continuation.family import Family, no_time
-from hybrid.orbits.continuation.passing import CLOSED, Flow, Pass
+from hybrid.orbits.continuation.passing import Flow, Pass
 from hybrid.orbits.continuation.route import Loop, Stretch
 from hybrid.orbits.factors import MOST_ATTEMPTS, OTHER_UNITS, Products, suited
 from hybrid.orbits.periodic_schur import ProductEigenvalues, product_eigenvalues
@@ -64,29 +64,14 @@ class Lap:
 
     orbit: Pass | None
     units: np.ndarray
-    legs: tuple[Leg, ...] = ()
+    legs: tuple[tuple[Flow, Leg], ...] = ()
     maps: tuple[list[np.ndarray], ...] = ()
     singular: tuple[list[bool], ...] = ()
 
     def in_order_of(self, arc: HybridArc) -> Lap:
-        """The lap with the events of each instant in the order in which another run around meets them.
-
-        Rounding decides the order of events that meet by themselves.
-        """
-        if self.orbit is None:
-            return self
-        legs, period, family = list(self.legs), self.orbit.loop.period, self.orbit.family
-        for i, leg in enumerate(legs):
-            late = (arc.jumps.t - leg.end_time + 0.5 * period) % period - 0.5 * period
-            here = np.flatnonzero(np.abs(late) <= CLOSED * period)
-            jumps = [arc.jumps[int(k)] for k in here]
-            if len(jumps) < 2 or len(leg.fired) < 2 or leg.within:
-                continue
-            if (jumps[0].source, jumps[-1].target) == (leg.end_mode, legs[(i + 1) % len(legs)].mode):
-                legs[i] = attrs.evolve(leg, fired=tuple(jump.transition for jump in jumps))
-        if all(one.fired == other.fired for one, other in zip(legs, self.legs, strict=True)):
-            return self
-        return _measured(family, legs, self.units)
+        """The lap with events that meet at one instant in the order in which another run around makes them."""
+        other = None if self.orbit is None else self.orbit.in_order_of(arc)
+        return self if other is None or other is self.orbit else _mapped(other, self.legs, self.units)
 
     @property
     def jumps(self) -> list[Fired] | None:
@@ -245,8 +230,13 @@ def _measured(family: Family, legs: list[Leg], units: np.ndarray) -> Lap:
     counted = (legs[-1].end - legs[0].x)[n:]
     family = attrs.evolve(family, route=route, counted=counted)
     orbit = Pass(family, loop, tuple(flows), (None,) * len(legs)).parted
-    found = {id(flow): leg for flow, leg in zip(flows, legs, strict=True)}
-    maps, singular, leg = list[list[np.ndarray]](), list[list[bool]](), legs[0]
+    return _mapped(orbit, tuple(zip(flows, legs, strict=True)), units)
+
+
+def _mapped(orbit: Pass, legs: tuple[tuple[Flow, Leg], ...], units: np.ndarray) -> Lap:
+    """The lap with these flows of legs, and others that take no time between them."""
+    found, leg = {id(flow): leg for flow, leg in legs}, legs[0][1]
+    maps, singular = list[list[np.ndarray]](), list[list[bool]]()
     for flow, landing, saltation in zip(orbit.flows, orbit.landings, orbit.saltations, strict=True):
         leg = found.get(id(flow), leg)
         maps.append([*leg.factors] if id(flow) in found else [])
@@ -257,4 +247,4 @@ def _measured(family: Family, legs: list[Leg], units: np.ndarray) -> Lap:
     if all(landing is None for landing in orbit.landings):
         maps[-1].append(orbit.onto_its_surface / units[:, None] * units)
         singular[-1].append(True)
-    return Lap(orbit, units, tuple(legs), tuple(maps), tuple(singular))
+    return Lap(orbit, units, legs, tuple(maps), tuple(singular))

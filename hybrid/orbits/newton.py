@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 from hybrid.orbits.rest import EPSILON, Drift
-from hybrid.status import Status
+from hybrid.status import Status, StatusCode
 from hybrid.system.periodicity import closed_change
 
 # Rounding of the end of an orbit, in units in the last place of its largest states: the largest gap accepted
@@ -98,9 +98,14 @@ class Shot:
         return slopes
 
     @property
+    def reached(self) -> bool:
+        """Whether the run is valid up to its end; where an order mattered it is that of the order listed."""
+        return self.status.ok or self.status.code == StatusCode.AMBIGUOUS_ORDER
+
+    @property
     def whole(self) -> bool:
         """Whether the run reached its end, in the mode where it began, with finite tangent vectors."""
-        return self.status.ok and self.end_mode == self.mode and bool(np.all(np.isfinite(self.fundamental)))
+        return self.reached and self.end_mode == self.mode and bool(np.all(np.isfinite(self.fundamental)))
 
     @property
     def rounding(self) -> np.ndarray:

@@ -19,7 +19,7 @@ from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.plan import check_solver
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver, Taylor
-from hybrid.status import Status
+from hybrid.status import Status, StatusCode
 from hybrid.system.entries import has_age
 from hybrid.system.graph import HybridSystem
 from hybrid.system.periodicity import whole_turns
@@ -36,10 +36,14 @@ MOMENT = 1e-8
 class PeriodicOrbit:
     """A periodic orbit, or the best point that Newton's method reached.
 
-    Where ``status.ok`` is false there is no orbit. Multipliers, logarithms and the fundamental matrix are
+    Where ``closes`` is false there is no orbit. Multipliers, logarithms and the fundamental matrix are
     then those of the run over the period from the best point; they say nothing of the stability of an orbit.
     What builds on orbits (`continue_orbit`, `sensitivity`,
     `lyapunov.floquet_exponents`) refuses such a point.
+
+    With the status ``AMBIGUOUS_ORDER`` there is an orbit, on which two events come at one instant. A small
+    disturbance decides which of them comes first, and each order has a derivative of its own. Multipliers,
+    logarithms and the fundamental matrix are those of the order in ``transitions``.
 
     Attributes
     ----------
@@ -70,7 +74,8 @@ class PeriodicOrbit:
     transitions
         Names of the transitions in the order they fire.
     status
-        Whether Newton's method converged, and how far it got if not.
+        Whether Newton's method converged, and how far it got if not; ``AMBIGUOUS_ORDER`` for an orbit whose
+        derivative depends on the order of two events.
     turns
         Whole turns of each angle of the system over the period, by name.
 
@@ -113,6 +118,11 @@ class PeriodicOrbit:
         return labelled_orbit(self)
 
     @property
+    def closes(self) -> bool:
+        """Whether there is an orbit."""
+        return closes(self.status)
+
+    @property
     def forcing_periods(self) -> int:
         """Number of forcing periods until the orbit closes; 0 for an autonomous system."""
         forcing = self.system.forcing_period(self.parameters)
@@ -134,7 +144,7 @@ class PeriodicOrbit:
             If the orbit has not converged, a parameter does not exist, or the orbit is not isolated: a
             multiplier is 1, besides the one along an autonomous orbit.
         """
-        if not self.status.ok:
+        if not self.closes:
             raise ArgumentError(f"The orbit has not converged: {self.status.message}")
         given = arguments.items("names", names, "be names of parameters", least=1)
         for name in given:
@@ -167,6 +177,11 @@ class PeriodicOrbit:
 
     def _run(self, x: np.ndarray, t: float, end: float, mode: str, solver: Solver | None) -> HybridArc:
         return simulate(self.system, x, (t, end), mode=mode, parameters=self.parameters, solver=solver)
+
+
+def closes(status: Status) -> bool:
+    """Whether a status is that of an orbit."""
+    return status.ok or status.code == StatusCode.AMBIGUOUS_ORDER
 
 
 def unaged(orbits: Sequence[PeriodicOrbit]) -> list[PeriodicOrbit]:

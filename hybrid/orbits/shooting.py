@@ -15,7 +15,7 @@ from hybrid.orbits.continuation.route import accumulating
 from hybrid.orbits.held import Held, held_by
 from hybrid.orbits.lap import Fired, Lap, lap_of
 from hybrid.orbits.newton import ROUNDING_OF_GAP, Newton, Point, Shot, length
-from hybrid.orbits.orbit import PeriodicOrbit, turns_over
+from hybrid.orbits.orbit import PeriodicOrbit, closes, turns_over
 from hybrid.orbits.rest import EPSILON, drift
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.ending import status_of
@@ -146,7 +146,7 @@ class Shooting:
         if held is None or FAMILY not in found.status.message:
             return found
         other = attrs.evolve(self, held=held)._search(shot, False, tolerance, max_iterations)
-        return other if other.status.ok else found
+        return other if other.closes else found
 
     def _search(self, shot: Shot, free_period: bool, tolerance: float, max_iterations: int) -> PeriodicOrbit:
         """Newton's method from the first shot."""
@@ -218,7 +218,7 @@ class Shooting:
                 "Start nearer to the orbit, with a better guess of its period.",
             )
             return attrs.evolve(orbit, status=status)
-        if not orbit.status.ok:
+        if not orbit.closes:
             return orbit
         return self._nearest(orbit, guess)
 
@@ -332,18 +332,18 @@ class Shooting:
 
     def _result(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> PeriodicOrbit:
         lap, jumps = self._lap(shot)
-        orbit = self._around(lap, lap.jumps or jumps, shot)
-        if orbit.status.ok:
-            lap = lap.in_order_of(orbit.arc())
-            orbit = self._around(lap, lap.jumps or jumps, shot)
+        orbit = self._orbit(lap, lap.jumps or jumps, shot)
         status = self._status(shot, newton, iterations, tolerance)
+        if closes(status) and lap.orbit is not None and lap.orbit.has_meetings:
+            lap = lap.in_order_of(orbit.arc())
+            orbit = self._orbit(lap, lap.jumps or jumps, shot)
         if status.ok:
             status = self._explained(status, shot, newton, orbit.multipliers)
         if status.ok and lap.orbit is not None:
             status = order_status(lap.orbit) or status
         return attrs.evolve(orbit, iterations=iterations, status=status)
 
-    def _around(self, lap: Lap, jumps: list[Fired], shot: Shot) -> PeriodicOrbit:
+    def _orbit(self, lap: Lap, jumps: list[Fired], shot: Shot) -> PeriodicOrbit:
         """A lap as an orbit, from the point that was asked for."""
         eigenvalues = lap.eigenvalues
         orbit = PeriodicOrbit(
@@ -410,7 +410,7 @@ class Shooting:
 
     def _status(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> Status:
         """How Newton's method ended: with an orbit, or why there is none."""
-        if not shot.status.ok:
+        if not shot.reached:
             return shot.status
         reason = self._objection(shot, newton, iterations, tolerance)
         if reason is None:

@@ -35,12 +35,16 @@ class Meeting:
         The stretches before and after the instant.
     slopes
         Derivatives ``(events, n)`` of the times of the events in the state before the instant.
+    map, state
+        The derivative ``(n, n)`` across the instant, and the state ``(n,)`` after it.
     """
 
     names: tuple[str, ...]
     before: int
     after: int
     slopes: np.ndarray
+    map: np.ndarray
+    state: np.ndarray
 
 
 def order_status(orbit: Pass) -> Status | None:
@@ -49,15 +53,14 @@ def order_status(orbit: Pass) -> Status | None:
         return None
     for meeting in _meetings(orbit):
         if _order_matters(orbit, meeting):
-            names = " and ".join(map(repr, dict.fromkeys(meeting.names)))
+            names = " and ".join(map(repr, meeting.names[:2]))
             t = orbit.loop.times[meeting.before + 1]
             return Status(
                 StatusCode.AMBIGUOUS_ORDER,
-                f"The orbit closes. {names} are reached together at t = {t:.9g}, and each order has its own "
-                "derivative: the multipliers are those of the order in which transitions= of the orbit lists "
-                "them.",
-                "An orbit beside this one, at another parameter, tells the multipliers of the other order. If "
-                "the order is meant, declare HybridSystem(listed_order=True).",
+                f"The orbit closes. At t = {t:.9g} the guards of {names} are reached together, and each order has "
+                "a derivative of its own: the multipliers are those of the order in orbit.transitions.",
+                "Runs with tangent= from starts beside the orbit show both derivatives. If the order is meant, "
+                "declare HybridSystem(listed_order=True).",
             )
     return None
 
@@ -70,6 +73,7 @@ def _meetings(orbit: Pass) -> Iterator[Meeting]:
         if not lasting[i] or orbit.landings[i] is None:
             continue
         names, slopes, product, k = list[str](), list[np.ndarray](), np.eye(n), i
+        state = orbit.flows[i].end
         while True:
             landing = orbit.landings[k]
             if landing is None:
@@ -77,7 +81,7 @@ def _meetings(orbit: Pass) -> Iterator[Meeting]:
             with np.errstate(all="ignore"):
                 slopes.append(-landing.gradient[:n] @ product / orbit.speed(k))
             names.append(orbit.family.route[k].fired[0])
-            product = orbit.saltations[k] @ product
+            product, state = orbit.saltations[k] @ product, landing.after
             k = (k + 1) % count
             if lasting[k]:
                 break
@@ -85,7 +89,7 @@ def _meetings(orbit: Pass) -> Iterator[Meeting]:
             names.append(name)
             slopes.append(slope)
         if len(names) > 1 and np.all(np.isfinite(slopes)):
-            yield Meeting(tuple(names), i, k, np.array(slopes))
+            yield Meeting(tuple(names), i, k, np.array(slopes), product, state)
 
 
 def _others(orbit: Pass, i: int) -> Iterator[tuple[str, np.ndarray]]:
@@ -132,13 +136,8 @@ def _differs(orbit: Pass, meeting: Meeting, near: float, shift: np.ndarray) -> b
     if found[0] is None or found[1] is None:
         return True
     limit = 2.0 * found[1] - found[0]
-    units, route = orbit.scale, orbit.family.route
-    product, k = np.eye(len(units)), meeting.before
-    while k != meeting.after:
-        product = orbit.saltations[k] @ product
-        last, k = orbit.landings[k], (k + 1) % len(route)
-    assert last is not None
-    wanted = np.column_stack([product * units, last.after]) / units[:, None]
+    units = orbit.scale
+    wanted = np.column_stack([meeting.map * units, meeting.state]) / units[:, None]
     limit = np.column_stack([limit[:, :-1] * units, limit[:, -1]]) / units[:, None]
     return not np.all(np.abs(limit - wanted) <= SAME * max(1.0, float(np.abs(wanted).max())))
 

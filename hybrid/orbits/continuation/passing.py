@@ -125,6 +125,37 @@ class Pass:
         )
         return Pass(family, loop, tuple(flows), landings)
 
+    @property
+    def has_meetings(self) -> bool:
+        """Whether events meet at one instant by themselves."""
+        return bool(np.any(np.diff(self.loop.times) <= CLOSED * self.loop.period))
+
+    def in_order_of(self, arc: HybridArc) -> Pass:
+        """The same orbit, with events that meet at one instant in the order in which a run around makes them.
+
+        Rounding decides that order. The events may be other transitions then, through other modes.
+        """
+        route, period = self.family.route, self.loop.period
+        lasting = np.flatnonzero(np.diff(self.loop.times) > CLOSED * period)
+        ends, stretches, changed = [*lasting[1:], len(route)], [], False
+        for i, after in zip(lasting.tolist(), ends, strict=True):
+            fired = tuple(name for stretch in route[i:after] for name in stretch.fired)
+            late = (arc.jumps.t - self.loop.times[i + 1] + 0.5 * period) % period - 0.5 * period
+            jumps = [arc.jumps[int(j)] for j in np.flatnonzero(np.abs(late) <= CLOSED * period)]
+            if after > i + 1 and jumps and not route[i].within:
+                ends_meet = jumps[0].source, jumps[-1].target
+                names = tuple(jump.transition for jump in jumps)
+                if names != fired and ends_meet == (route[i].end_mode, route[after % len(route)].mode):
+                    fired, changed = names, True
+            stretches.append(attrs.evolve(route[i], fired=fired))
+        if not changed or lasting[0] != 0:
+            return self
+        flows = tuple(self.flows[i] for i in lasting)
+        times = np.append(self.loop.times[lasting], self.loop.times[-1])
+        loop = Loop(self.loop.x[lasting], times, self.loop.values)
+        family = attrs.evolve(self.family, route=tuple(stretches))
+        return Pass(family, loop, flows, (None,) * len(flows)).parted
+
     def units(self, sizes: np.ndarray) -> np.ndarray:
         """Units of the unknowns, for parameters of the ``sizes (k,)``.
 

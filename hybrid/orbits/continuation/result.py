@@ -5,6 +5,7 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
+from hybrid.orbits.continuation.order import order_status
 from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import moment, share_of
 from hybrid.orbits.continuation.route import Route
@@ -42,9 +43,22 @@ def orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
 
 
 def whole_orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
-    """The orbit from the point that stands for it, with the age if the family has one."""
-    family, loop = orbit.family, orbit.loop
+    """The orbit from the point that stands for it, with the age if the family has one.
+
+    Events that meet at one instant are listed as the arc of the orbit shows them.
+    """
     i, share = points.at(orbit)
+    found = _orbit_from(orbit, i, share, points.t0)
+    if orbit.has_meetings:
+        other = orbit.in_order_of(found.arc())
+        i = next(j for j, flow in enumerate(other.flows) if flow is orbit.flows[i])
+        found, orbit = _orbit_from(other, i, share, points.t0), other
+    return attrs.evolve(found, status=order_status(orbit) or SUCCESS)
+
+
+def _orbit_from(orbit: Pass, i: int, share: float, t0: float) -> PeriodicOrbit:
+    """The orbit from a share of a stretch, or from a time if the system is forced."""
+    family, loop = orbit.family, orbit.loop
     (t, x), mode = moment(orbit, i, share), mode_at(orbit, i, share)
     multipliers = orbit.multipliers
     with np.errstate(divide="ignore"):
@@ -58,7 +72,7 @@ def whole_orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
         parameters=family.all_parameters(loop.values),
         x0=x,
         mode=mode,
-        t0=points.t0 if family.forced else t,
+        t0=t0 if family.forced else t,
         period=loop.period,
         multipliers=multipliers,
         log_moduli=moduli,
