@@ -10,7 +10,7 @@ import numpy as np
 from hybrid.orbits.continuation.passing import CLOSED
 from hybrid.orbits.lap import Fired, Lap
 from hybrid.orbits.newton import Point, Shot
-from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.orbits.orbit import PeriodicOrbit, first_start
 from hybrid.system.periodicity import whole_turns
 
 
@@ -35,8 +35,8 @@ class Asked:
         """The orbit from its point at the time that was asked for.
 
         If the orbit jumps there, the point is the state before the jumps or the state after them, whichever is
-        nearer to the guess. A state in another mode than the guess is not near, and one from which a run does
-        not make these jumps is no start: a clock does not tick at the start of a run.
+        nearer to the guess; a state in another mode than the guess is not near. If neither is a start, it is
+        the state a moment later.
         """
         assert lap.orbit is not None
         times, route, n = lap.orbit.loop.times[:-1], lap.orbit.family.route, len(shot.end)
@@ -58,7 +58,10 @@ class Asked:
             (each.mode != self.mode, float(np.linalg.norm((each.x0[:n] - self.point.x) / extent)))
             for each in (before, after)
         ]
-        return before if apart[0] < apart[1] and before.first_jumps() == met else after
+        points = [(before, met), (after, [])]
+        rate, moment = lap.orbit.flows[last].first_rate, orbit.moment
+        later = attrs.evolve(after, t0=after.t0 + moment, x0=after.x0 + moment * np.append(rate, 0.0 * self.counters))
+        return first_start([*(points if apart[0] < apart[1] else points[::-1]), (later, [])])
 
     def _from(
         self, orbit: PeriodicOrbit, x: np.ndarray, mode: str, jumps: Sequence[Fired], *, first: bool

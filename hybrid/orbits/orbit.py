@@ -166,17 +166,28 @@ class PeriodicOrbit:
         jumps = len(start.jumps) > 0 or bool(np.any(np.abs(arc.jumps.t - end) <= after - self.t0))
         return arc if jumps and start.status.ok else self._run(self.x0, self.t0, end, self.mode, solver)
 
-    def first_jumps(self) -> list[str]:
-        """Names of the transitions that a run from the point makes at once."""
-        return [str(name) for name in self._first_moment(None).jumps.transition]
+    @property
+    def moment(self) -> float:
+        """A time after which a run is clear of the guards of jumps at its start."""
+        return max(MOMENT * self.period, ROUNDING_OF_TIME * math.ulp(abs(self.t0) + self.period))
 
     def _first_moment(self, solver: Solver | None) -> HybridArc:
-        """A run from the point that is clear of the guards of jumps there at its end."""
-        least = ROUNDING_OF_TIME * math.ulp(abs(self.t0) + self.period)
-        return self._run(self.x0, self.t0, self.t0 + max(MOMENT * self.period, least), self.mode, solver)
+        return self._run(self.x0, self.t0, self.t0 + self.moment, self.mode, solver)
 
     def _run(self, x: np.ndarray, t: float, end: float, mode: str, solver: Solver | None) -> HybridArc:
         return simulate(self.system, x, (t, end), mode=mode, parameters=self.parameters, solver=solver)
+
+
+def first_start(points: Iterable[tuple[PeriodicOrbit, Sequence[str]]]) -> PeriodicOrbit:
+    """The first of some points of an orbit from which a run makes the jumps at once that it is to make there.
+
+    On a guard or a tick a state may be no start: a clock does not tick at the start of a run, and a guard of
+    time alone that is zero there fires, also after its jump.
+    """
+    for orbit, names in points:
+        if [str(name) for name in orbit._first_moment(None).jumps.transition] == list(names):
+            break
+    return orbit
 
 
 def closes(status: Status) -> bool:
