@@ -60,7 +60,9 @@ class Asked:
         ]
         points = [(before, met), (after, [])]
         rate, moment = lap.orbit.flows[last].first_rate, orbit.moment
-        later = attrs.evolve(after, t0=after.t0 + moment, x0=after.x0 + moment * np.append(rate, 0.0 * self.counters))
+        later = attrs.evolve(
+            after, t0=after.t0 + moment, x0=after.x0 + moment * np.append(rate, 0.0 * self.counters)
+        )
         return first_start([*(points if apart[0] < apart[1] else points[::-1]), (later, [])])
 
     def _from(

@@ -226,7 +226,9 @@ def _measured(family: Family, legs: list[Leg], units: np.ndarray) -> Lap:
         for each in leg.factors:
             slopes = each @ slopes
         slopes = slopes * units[:, None] / units
-        flows.append(Flow(None, leg.end[:n], slopes, leg.first_rate, leg.last_rate, tuple(leg.end[n:].tolist())))
+        flows.append(
+            Flow(None, leg.end[:n], slopes, leg.first_rate, leg.last_rate, tuple(leg.end[n:].tolist()))
+        )
     counted = (legs[-1].end - legs[0].x)[n:]
     family = attrs.evolve(family, route=route, counted=counted)
     orbit = Pass(family, loop, tuple(flows), (None,) * len(legs)).parted

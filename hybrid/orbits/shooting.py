@@ -274,9 +274,7 @@ class Shooting:
         candidates, distance = self._quietness(arc, guess, np.concatenate([[0.0], arc.jumps.t - guess.t]))
         return float(candidates[np.argmax(distance)])
 
-    def _quietness(
-        self, arc: HybridArc, guess: Point, jumps: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def _quietness(self, arc: HybridArc, guess: Point, jumps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Times after the guess, and how far they and those one period later are from jumps."""
         candidates = np.linspace(0, guess.period, 201)[:-1]
         at = np.searchsorted(arc.t, guess.t + candidates, side="right") - 1
@@ -492,4 +490,3 @@ class Shooting:
             f"the ends agree to {length(shot.gap):.3g}, but the next step would move the start by "
             f"{length(step):.3g}: the solution drifts, or no orbit is near"
         )
-

@@ -377,7 +377,9 @@ def _goes(orbit: Pass, first: int, last: int) -> bool:
         if jump.transition not in passed
     ]
     wanted = [
-        _Event(float(loop.times[i % count + 1] + i // count * loop.period), names, route[(i + 1) % count].mode)
+        _Event(
+            float(loop.times[i % count + 1] + i // count * loop.period), names, route[(i + 1) % count].mode
+        )
         for i in range(first, last)
         if (names := tuple(name for name in route[i % count].fired if name not in passed))
     ]
