@@ -12,6 +12,8 @@ from hybrid.system.periodicity import closed_change
 # Rounding of the end of an orbit, in units in the last place of its largest states: the largest gap accepted
 # when Newton's method makes no more progress.
 ROUNDING_OF_GAP = 100
+# The matrix of Newton's method is as rounded: a direction in which it is below this share of its size is not known.
+UNKNOWN = ROUNDING_OF_GAP * EPSILON
 
 
 def length(vector: np.ndarray) -> float:
@@ -187,7 +189,7 @@ class Newton:
                 np.all(np.isfinite(self._matrix(shot))) and np.all(np.isfinite(self._right(shot, self.scale)))
             )
 
-    def step(self, shot: Shot, smallest: float | None = None) -> tuple[np.ndarray, float]:
+    def step(self, shot: Shot, smallest: float = UNKNOWN) -> tuple[np.ndarray, float]:
         """Newton step of the state and of the period.
 
         It leaves out the directions in which the matrix is smaller than a share ``smallest`` of its largest
@@ -235,7 +237,7 @@ class Newton:
         """
         n = len(shot.end)
         _, sizes, right = np.linalg.svd(self._matrix(shot))
-        family = right[sizes <= (n + 1) * EPSILON * sizes[0], :n]
+        family = right[sizes <= UNKNOWN * sizes[0], :n]
         gone = family.T @ (family @ ((shot.point.x - self.anchor) / self.scale)) * self.scale
         return bool(np.any(np.abs(gone) > farthest * self.first))
 

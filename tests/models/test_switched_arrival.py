@@ -56,8 +56,18 @@ def test_a_switch_stretches_areas():
         assert np.linalg.det(found) == pytest.approx(1 - 1 / rate, rel=1e-12)
 
 
-@pytest.mark.parametrize("rates", [EQUAL, UNEQUAL])
-def test_exponents(rates):
+def test_with_equal_rates_each_switch_doubles_areas():
+    """So the exponents count the switches, also where rounding makes the orbit a periodic one."""
+    result = lyapunov.lyapunov_spectrum(
+        switched_arrival(), START, mode="fill1", parameters=parameters(EQUAL), interval=1.0, intervals=500
+    )
+    assert result.jumps_per_interval > 1.0
+    assert result.exponents.sum() == pytest.approx(np.log(2) * result.jumps_per_interval, rel=1e-9)
+    np.testing.assert_allclose(result.exponents[1:], 0.0, atol=3e-2)
+
+
+def test_exponents():
+    rates = UNEQUAL
     result = lyapunov.lyapunov_spectrum(
         switched_arrival(), START, mode="fill1", parameters=parameters(rates), interval=1.0, intervals=5000
     )
