@@ -1,4 +1,4 @@
-"""The point of a forced orbit at the time that it was asked for, where the search was done at another time."""
+"""The point of a forced orbit at the time that it was asked for; the search was done at another time."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ class Asked:
     def answered(self, orbit: PeriodicOrbit, lap: Lap, jumps: Sequence[Fired], shot: Shot) -> PeriodicOrbit:
         """The orbit from its point at the time that was asked for.
 
-        If the orbit jumps there, the point is the state before the jumps or the state after them, whichever is
-        nearer to the guess; a state in another mode than the guess is not near. If neither is a start, it is
+        If the orbit jumps there, the point is the state before the jumps or the state after them: whichever
+        is nearer to the guess; a state in another mode than the guess is not near. If neither is a start, it is
         the state a moment later.
         """
         assert lap.orbit is not None

@@ -67,6 +67,7 @@ class Products:
         return self.trajectory.tangent_matrix / self.units[:, None]
 
     def orthonormalise(self, *, singular: bool = False) -> None:
+        """Make the vectors orthonormal, and keep the factor; a ``singular`` one annihilates a direction."""
         if singular:
             self.singular.add(len(self.matrices))
         vectors = self.vectors
@@ -125,6 +126,7 @@ class Products:
         return self.sizes + self._sizes_of(self.vectors)
 
     def ended(self, code: int) -> Factors:
+        """The factors of a run that has ended with a code."""
         return Factors(self.factors, self.singular, suited(self.units, self.all_sizes), code)
 
     def _sizes_of(self, vectors: np.ndarray) -> np.ndarray:

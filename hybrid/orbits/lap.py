@@ -58,8 +58,8 @@ class Lap:
     """A lap: its stretches as a pass, and the tangent map of each stretch and of each instant as factors.
 
     ``orbit`` is None where the run did not come around. ``maps`` are the factors by stretches, in ``units
-    (n,)`` of the states, the jumps at the end of a stretch last; ``singular`` tells which of them annihilate a
-    direction.
+    (n,)`` of the states, the jumps at the end of a stretch last. ``singular`` tells which of them annihilate
+    a direction. ``legs`` has the flows with the legs that they come from.
     """
 
     orbit: Pass | None
@@ -69,7 +69,7 @@ class Lap:
     singular: tuple[list[bool], ...] = ()
 
     def in_order_of(self, arc: HybridArc) -> Lap:
-        """The lap with events that meet at one instant in the order in which another run around makes them."""
+        """The lap with events that meet at one instant in the order in which another run makes them."""
         other = None if self.orbit is None else self.orbit.in_order_of(arc)
         return self if other is None or other is self.orbit else _mapped(other, self.legs, self.units)
 
@@ -161,7 +161,8 @@ class _Flight:
         """The next leg, None if the run ends early; with DONE at the place."""
         run, n = self.trajectory, len(self.units)
         products = Products(run, self.units)
-        begin, within = (run.mode, run.t, run.x, run.field()[:n]), ()
+        begin = run.mode, run.t, run.x, run.field()[:n]
+        within: tuple[str, ...] = ()
         while True:
             code = products.fly(place)
             if code not in (codes.DONE, codes.MAX_JUMPS):
@@ -198,7 +199,7 @@ class _Flight:
 
 
 def _joined(legs: list[Leg]) -> list[Leg]:
-    """The legs without those that take no time but for rounding: the jumps at their ends are of one instant."""
+    """The legs without those that take no time but for rounding: the jumps at their ends meet."""
     found: list[Leg] = []
     for leg in legs:
         if found and found[-1].fired and no_time(leg.t, leg.end_time):

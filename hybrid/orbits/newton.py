@@ -12,7 +12,7 @@ from hybrid.system.periodicity import closed_change
 # Rounding of the end of an orbit, in units in the last place of its largest states: the largest gap accepted
 # when Newton's method makes no more progress.
 ROUNDING_OF_GAP = 100
-# The matrix of Newton's method is as rounded: a direction in which it is below this share of its size is not known.
+# The matrix of Newton's method is as rounded: what is below this share of its size is not known.
 UNKNOWN = ROUNDING_OF_GAP * EPSILON
 
 

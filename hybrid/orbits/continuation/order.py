@@ -1,7 +1,7 @@
 """Whether the derivative of an orbit depends on which of two events of one instant comes first.
 
-On neighbouring orbits the events come one after the other. Where each order has its own derivative, the orbit has no
-common one: its multipliers are those of one order.
+On neighbouring orbits the events come one after the other. Where each order has its own derivative, the orbit
+has no common one: its multipliers are those of one order.
 """
 
 from __future__ import annotations
@@ -57,10 +57,10 @@ def order_status(orbit: Pass) -> Status | None:
             t = orbit.loop.times[meeting.before + 1]
             return Status(
                 StatusCode.AMBIGUOUS_ORDER,
-                f"The orbit closes. At t = {t:.9g} the guards of {names} are reached together, and each order has "
-                "a derivative of its own: the multipliers are those of the order in orbit.transitions.",
-                "Runs with tangent= from starts beside the orbit show both derivatives. If the order is meant, "
-                "declare HybridSystem(listed_order=True).",
+                f"The orbit closes. At t = {t:.9g} the guards of {names} are reached together. Each order "
+                "has a derivative of its own: the multipliers are those of the order in orbit.transitions.",
+                "Runs with tangent= from starts beside the orbit show both derivatives. If the order is "
+                "meant, declare HybridSystem(listed_order=True).",
             )
     return None
 
@@ -93,7 +93,7 @@ def _meetings(orbit: Pass) -> Iterator[Meeting]:
 
 
 def _others(orbit: Pass, i: int) -> Iterator[tuple[str, np.ndarray]]:
-    """Other guards of the mode that are reached at the end of a stretch, with the derivatives of the times."""
+    """Other guards of the mode that are reached at the end of a stretch, with derivatives of the times."""
     family, values, stretch, n = orbit.family, orbit.loop.values, orbit.family.route[i], orbit.family.n
     t, x = float(orbit.loop.times[i + 1]), np.append(orbit.flows[i].end, orbit.flows[i].counters)
     sizes = np.append(np.append(orbit.scale, np.abs(x[n:])), orbit.loop.period)

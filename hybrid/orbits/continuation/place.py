@@ -308,8 +308,8 @@ def refined(place: Place) -> Place:
 def share_of(orbit: Pass, t: float) -> tuple[int, float]:
     """The stretch at a time, whole periods aside, and the share of the stretch before it.
 
-    What is no farther than rounding from the end of a stretch is at the begin of the next one, after the jumps:
-    the state before them need not be a start, since a clock does not tick at the start of a run.
+    What is no farther than rounding from the end of a stretch is at the begin of the next one, after the
+    jumps: the state before them need not be a start, since a clock does not tick at the start of a run.
     """
     times, period = orbit.loop.times, orbit.loop.period
     least = CLOSED * period
@@ -414,6 +414,6 @@ def _instants(events: list[_Event], least: float) -> list[list[_Event]]:
 
 
 def _same(made: list[_Event], wanted: list[_Event]) -> bool:
-    """Whether the jumps of an instant are those that are wanted: events that meet there may come in any order."""
+    """Whether the jumps of an instant are those wanted: events that meet there may come in any order."""
     names = [[name for event in events for name in event.names] for events in (made, wanted)]
     return names[0] == names[1] or (len(wanted) > 1 and made[-1].mode == wanted[-1].mode)

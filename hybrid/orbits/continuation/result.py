@@ -59,7 +59,7 @@ def whole_orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
 
 
 def _start_from(orbit: Pass, i: int, share: float, t0: float) -> PeriodicOrbit:
-    """The orbit from a share of a stretch; where it jumps there, from after or before these jumps or later."""
+    """The orbit from a share of a stretch; if it jumps there, from after or before these jumps or later."""
     found, stays = _orbit_from(orbit, i, share, t0), np.diff(orbit.loop.times)
     if share > 0.0 or orbit.landings[i - 1] is None or not orbit.family.forced:
         return found

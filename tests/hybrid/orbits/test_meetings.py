@@ -1,4 +1,4 @@
-"""Events that meet at one instant by themselves: phase-locked loops, and converters whose tick meets a crossing."""
+"""Events that meet at one instant by themselves: phase-locked loops, and samples that meet a crossing."""
 
 import numpy as np
 import pytest
@@ -150,22 +150,23 @@ def sampled(delayed):
 
     ``y`` falls to its limit exactly at the tick, where it is set back by 1.
     """
+    refill = Reset(lambda t, x, p: {"y": x.y + 1.0})
     return HybridSystem(
         state=("y",),
         held=("u",),
         parameters={"k": 0.25},
         modes=[Mode("on", lambda t, x, p: (-1.0 + x.u,))],
         transitions=[
-            Transition("on", "on", Guard(lambda t, x, p: x.y, -1), Reset(lambda t, x, p: {"y": x.y + 1.0}), name="refill"),
+            Transition("on", "on", Guard(lambda t, x, p: x.y, -1), refill, name="refill"),
             Transition("on", "on", Every(1.0), Reset(lambda t, x, p: {"u": delayed(x, p)}), name="sample"),
         ],
         period=1.0,
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("t0", [0.25, 5.6])
 def test_the_sign_of_a_sample_decides_on_its_derivative(t0):
-    """The action is the distance of ``y`` from a whole number: it does not tell before from after the refill."""
+    """The action is a sine of ``y``, which does not tell before from after the refill."""
     system = sampled(lambda x, p: -p.k * np.sin(2.0 * np.pi * x.y) / (2.0 * np.pi))
     orbit = periodic_orbit(system, (1.0 - t0 % 1.0, 0.0), t0=t0)
     assert orbit.status.ok

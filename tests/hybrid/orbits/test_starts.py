@@ -1,4 +1,4 @@
-"""Orbits that are given at a jump, as papers print them: the state just after an impact, or just before it."""
+"""Orbits that are given at a jump, as papers print them: the state just after an impact, or before it."""
 
 import numpy as np
 import pytest
