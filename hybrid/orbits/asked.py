@@ -35,8 +35,8 @@ class Asked:
         """The orbit from its point at the time that was asked for.
 
         If the orbit jumps there, the point is the state before the jumps or the state after them: whichever
-        is nearer to the guess; a state in another mode than the guess is not near. If neither is a start, it is
-        the state a moment later.
+        is nearer to the guess; a state in another mode than the guess is not near. If neither is a start, it
+        is the state a moment later.
         """
         assert lap.orbit is not None
         times, route, n = lap.orbit.loop.times[:-1], lap.orbit.family.route, len(shot.end)

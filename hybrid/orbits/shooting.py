@@ -261,7 +261,7 @@ class Shooting:
         )
 
     def _quiet_time(self, guess: Point) -> float:
-        """The first time after the guess at which jumps are at least half as far as anywhere; 0 without jumps."""
+        """The first time after the guess with jumps at least half as far as anywhere; 0 without jumps."""
         arc = self._follow(guess, 2 * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
         if len(arc.jumps) == 0 or not arc.status.ok:
             return 0.0
