@@ -98,7 +98,7 @@ def convergence(regime: Regime) -> Figure:
 
 def _truth(regime: Regime) -> tuple[float, str]:
     """The best known value and its label."""
-    if regime.kind == "periodic" and regime.orbit.closes:
+    if regime.kind == "periodic" and regime.orbit.status.ok:
         return float(floquet_exponents(regime.orbit)[0]), "Floquet exponent"
     if regime.kind == "quasi-periodic":
         return 0.0, "zero for a torus"

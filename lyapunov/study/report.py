@@ -110,7 +110,7 @@ def _spectrum(regime: Regime) -> list[str]:
 
 def _orbit(regime: Regime) -> list[str]:
     orbit = regime.orbit
-    if not orbit.closes:
+    if not orbit.status.ok:
         return [f"Orbit of one period: none found, residual {orbit.residual:.1e}."]
     stable = "stable" if np.all(np.abs(orbit.multipliers) < 1) else "unstable"
     values = "  ".join(f"{value:.8f}" for value in floquet_exponents(orbit))
