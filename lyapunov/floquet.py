@@ -43,6 +43,6 @@ def floquet_exponents(orbit: PeriodicOrbit) -> np.ndarray:
     array([-0.08551, -0.08551])
     """
     arguments.instance("orbit", orbit, PeriodicOrbit, "Find one with hybrid.periodic_orbit.")
-    if not orbit.status.ok:
+    if not orbit.closes:
         raise ArgumentError(f"orbit has not converged: {orbit.status.message}")
     return orbit.log_moduli / orbit.period

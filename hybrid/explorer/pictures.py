@@ -230,7 +230,7 @@ def orbit_job(subject: Subject, scene: Scene, last: Callable[[], Live]) -> Job:
     def found() -> Any:
         call = orbit_call(subject, scene, last())
         orbit = call.result()
-        return scene, call, orbit, orbit.arc() if orbit.status.ok else None
+        return scene, call, orbit, orbit.arc() if orbit.closes else None
 
     return Job("orbit", (live_job(subject, scene).key, scene.periods), (found,))
 
@@ -284,7 +284,7 @@ def branch_job(subject: Subject, scene: Scene, last: Callable[[], Live]) -> Job:
         # The orbit that is shown moves on with the parameter, and the branch stays.
         first = attrs.evolve(orbit_call(subject, scene, last()), name="first")
         orbit = first.result()
-        if not orbit.status.ok:
+        if not orbit.closes:
             return (first,), orbit.status, None
         call = Call("branch", continue_orbit, (Written(orbit, "first"), scene.over, (scene.low, scene.high)))
         return (first, call), None, call.result()

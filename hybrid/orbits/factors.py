@@ -50,7 +50,7 @@ class Factors:
     code: int
 
 
-class _Products:
+class Products:
     """Tangent vectors that are orthonormal in given units, and the factors that made them so."""
 
     def __init__(self, trajectory: Trajectory, units: np.ndarray) -> None:
@@ -67,31 +67,85 @@ class _Products:
         return self.trajectory.tangent_matrix / self.units[:, None]
 
     def orthonormalise(self, *, singular: bool = False) -> None:
+        """Make the vectors orthonormal, and keep the factor; a ``singular`` one annihilates a direction."""
         if singular:
             self.singular.add(len(self.matrices))
         vectors = self.vectors
-        self._measure(vectors)
+        self.sizes += self._sizes_of(vectors)
         self.basis, triangle = rowwise_qr(vectors)
         self.matrices.append(triangle)
         self.trajectory.replace_tangents(self.units[:, None] * self.basis)
 
+    def fly(self, place: tuple[int, float]) -> int:
+        """Advance to a place in time or up to the next jump; DONE, MAX_JUMPS, or why the run ends early."""
+        trajectory, run = self.trajectory, self.trajectory.run
+        implicit = bool(trajectory.method.implicit)
+        while True:
+            if trajectory.stop.is_set():
+                return StatusCode.INTERRUPTED
+            before = run.saved() if implicit else None
+            steps, record = int(run.steps), trajectory.no_record()
+            if steps >= trajectory.max_steps:
+                return codes.MAX_STEPS
+            code = trajectory.advance_to(*place, record, max_steps=steps + 1, max_jumps=trajectory.jumps)
+            if code not in (codes.MAX_STEPS, codes.MAX_JUMPS, codes.DONE):
+                return code
+            vectors = self.vectors
+            if not np.all(np.isfinite(vectors)):
+                return codes.NON_FINITE
+            sizes = np.linalg.svd(vectors, compute_uv=False)
+            if before is not None and sizes[0] > WORST_CONDITION * LONGEST_STEP * sizes[-1]:
+                length = run.last_step
+                run.restore(before)
+                run.next_step = SHORTER * length
+                trajectory.replace_tangents(trajectory.tangent_matrix)
+                continue
+            if sizes[0] > WORST_CONDITION * sizes[-1] or not SMALLEST < sizes[0] < LARGEST:
+                self.orthonormalise()
+            if code != codes.MAX_STEPS:
+                return code
+
+    def jump(self, place: tuple[int, float]) -> int:
+        """Make the jumps of this instant, with a factor of their own."""
+        trajectory, run = self.trajectory, self.trajectory.run
+        self.orthonormalise()
+        run.log_determinant = 0.0
+        code = trajectory.advance_to(*place, trajectory.no_record(), max_steps=int(run.steps))
+        if code in (codes.MAX_STEPS, codes.DONE):
+            self.orthonormalise(singular=not run.log_determinant > -np.inf)
+        return code
+
+    @property
+    def factors(self) -> list[np.ndarray]:
+        """The factors so far."""
+        return [*self.matrices, self.vectors]
+
+    @property
+    def all_sizes(self) -> np.ndarray:
+        """Sizes ``(n, n)`` of the entries of the tangent maps so far."""
+        return self.sizes + self._sizes_of(self.vectors)
+
     def ended(self, code: int) -> Factors:
-        vectors = self.vectors
-        self._measure(vectors)
-        own = self.sizes * self.units[:, None] / self.units
-        units = self.units
-        if np.all(np.isfinite(own)):
-            # SciPy's linear algebra takes long to import.
-            from scipy.linalg import matrix_balance
+        """The factors of a run that has ended with a code."""
+        return Factors(self.factors, self.singular, suited(self.units, self.all_sizes), code)
 
-            # SciPy makes whole numbers of the units too, as if they were a permutation.
-            with np.errstate(invalid="ignore"):
-                [units, _] = matrix_balance(own, permute=False, separate=True)[1]
-        return Factors([*self.matrices, vectors], self.singular, units, code)
+    def _sizes_of(self, vectors: np.ndarray) -> np.ndarray:
+        found = np.abs(vectors @ self.basis.T)
+        return found if np.all(np.isfinite(found)) else np.zeros_like(found)
 
-    def _measure(self, vectors: np.ndarray) -> None:
-        if np.all(np.isfinite(vectors)):
-            self.sizes += np.abs(vectors @ self.basis.T)
+
+def suited(units: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """The units ``(n,)`` that suit tangent maps whose entries have these ``sizes (n, n)`` in other ones."""
+    own = sizes * units[:, None] / units
+    if not np.all(np.isfinite(own)):
+        return units
+    # SciPy's linear algebra takes long to import.
+    from scipy.linalg import matrix_balance
+
+    # SciPy makes whole numbers of the units too, as if they were a permutation.
+    with np.errstate(invalid="ignore"):
+        [found, _] = matrix_balance(own, permute=False, separate=True)[1]
+    return np.asarray(found)
 
 
 def fundamental_eigenvalues(start: Callable[[], Trajectory], t: float) -> ProductEigenvalues:
@@ -120,41 +174,15 @@ def fundamental_factors(trajectory: Trajectory, t: float, units: np.ndarray) -> 
     R_j``, and the last ``Q`` with what follows, all in ``units (n,)`` of the states. The jumps of one instant
     have a factor of their own, so that what they annihilate is told from what a flight makes small.
     """
-    run = trajectory.run
-    place, record = split_time(t, trajectory.model.period), trajectory.no_record()
+    place = split_time(t, trajectory.model.period)
     repeats = jumps_at_once(trajectory)
-    implicit = bool(trajectory.method.implicit)
-    products = _Products(trajectory, units)
+    products = Products(trajectory, units)
     while True:
-        if trajectory.stop.is_set():
-            return products.ended(StatusCode.INTERRUPTED)
-        before = run.saved() if implicit else None
-        steps = int(run.steps)
-        code = trajectory.advance_to(*place, record, max_steps=steps + 1, max_jumps=trajectory.jumps)
-        if code not in (codes.MAX_STEPS, codes.MAX_JUMPS, codes.DONE):
-            return products.ended(code)
-        vectors = products.vectors
-        if not np.all(np.isfinite(vectors)):
-            return products.ended(codes.NON_FINITE)
-        sizes = np.linalg.svd(vectors, compute_uv=False)
-        if before is not None and sizes[0] > WORST_CONDITION * LONGEST_STEP * sizes[-1]:
-            length = run.last_step
-            run.restore(before)
-            run.next_step = SHORTER * length
-            trajectory.replace_tangents(trajectory.tangent_matrix)
-            continue
-        if sizes[0] > WORST_CONDITION * sizes[-1] or not SMALLEST < sizes[0] < LARGEST:
-            products.orthonormalise()
+        code = products.fly(place)
         if code == codes.MAX_JUMPS and repeats and same_time(trajectory.t, t, trajectory.model.period):
-            return products.ended(codes.DONE)
-        if code == codes.MAX_JUMPS:
-            products.orthonormalise()
-            run.log_determinant = 0.0
-            code = trajectory.advance_to(*place, record, max_steps=int(run.steps))
-            if code not in (codes.MAX_STEPS, codes.DONE):
-                return products.ended(code)
-            products.orthonormalise(singular=not run.log_determinant > -np.inf)
-        if code == codes.DONE:
+            code = codes.DONE
+        if code != codes.MAX_JUMPS:
             return products.ended(code)
-        if run.steps >= trajectory.max_steps:
-            return products.ended(codes.MAX_STEPS)
+        code = products.jump(place)
+        if code != codes.MAX_STEPS:
+            return products.ended(code)

@@ -44,7 +44,7 @@ def described_orbit(orbit: Any) -> str:
 
     A point that is no orbit is not described as one: the line says how far from closing it is.
     """
-    if not orbit.status.ok:
+    if not orbit.closes:
         return f"<PeriodicOrbit {unfinished(orbit)}: {orbit.status.message}>"
     through = f" through {', '.join(map(repr, orbit.transitions))}" if orbit.transitions else ""
     largest = orbit.multipliers[0]

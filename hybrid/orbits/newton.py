@@ -6,12 +6,14 @@ import attrs
 import numpy as np
 
 from hybrid.orbits.rest import EPSILON, Drift
-from hybrid.status import Status
+from hybrid.status import Status, StatusCode
 from hybrid.system.periodicity import closed_change
 
 # Rounding of the end of an orbit, in units in the last place of its largest states: the largest gap accepted
 # when Newton's method makes no more progress.
 ROUNDING_OF_GAP = 100
+# The matrix of Newton's method is as rounded: what is below this share of its size is not known.
+UNKNOWN = ROUNDING_OF_GAP * EPSILON
 
 
 def length(vector: np.ndarray) -> float:
@@ -98,9 +100,14 @@ class Shot:
         return slopes
 
     @property
+    def reached(self) -> bool:
+        """Whether the run is valid up to its end; where an order mattered it is that of the order listed."""
+        return self.status.ok or self.status.code == StatusCode.AMBIGUOUS_ORDER
+
+    @property
     def whole(self) -> bool:
         """Whether the run reached its end, in the mode where it began, with finite tangent vectors."""
-        return self.status.ok and self.end_mode == self.mode and bool(np.all(np.isfinite(self.fundamental)))
+        return self.reached and self.end_mode == self.mode and bool(np.all(np.isfinite(self.fundamental)))
 
     @property
     def rounding(self) -> np.ndarray:
@@ -182,7 +189,7 @@ class Newton:
                 np.all(np.isfinite(self._matrix(shot))) and np.all(np.isfinite(self._right(shot, self.scale)))
             )
 
-    def step(self, shot: Shot, smallest: float | None = None) -> tuple[np.ndarray, float]:
+    def step(self, shot: Shot, smallest: float = UNKNOWN) -> tuple[np.ndarray, float]:
         """Newton step of the state and of the period.
 
         It leaves out the directions in which the matrix is smaller than a share ``smallest`` of its largest
@@ -230,7 +237,7 @@ class Newton:
         """
         n = len(shot.end)
         _, sizes, right = np.linalg.svd(self._matrix(shot))
-        family = right[sizes <= (n + 1) * EPSILON * sizes[0], :n]
+        family = right[sizes <= UNKNOWN * sizes[0], :n]
         gone = family.T @ (family @ ((shot.point.x - self.anchor) / self.scale)) * self.scale
         return bool(np.any(np.abs(gone) > farthest * self.first))
 

@@ -19,7 +19,7 @@ from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.plan import check_solver
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver, Taylor
-from hybrid.status import Status
+from hybrid.status import Status, StatusCode
 from hybrid.system.entries import has_age
 from hybrid.system.graph import HybridSystem
 from hybrid.system.periodicity import whole_turns
@@ -36,10 +36,14 @@ MOMENT = 1e-8
 class PeriodicOrbit:
     """A periodic orbit, or the best point that Newton's method reached.
 
-    Where ``status.ok`` is false there is no orbit. Multipliers, logarithms and the fundamental matrix are
+    Where ``closes`` is false there is no orbit. Multipliers, logarithms and the fundamental matrix are
     then those of the run over the period from the best point; they say nothing of the stability of an orbit.
     What builds on orbits (`continue_orbit`, `sensitivity`,
     `lyapunov.floquet_exponents`) refuses such a point.
+
+    With the status ``AMBIGUOUS_ORDER`` there is an orbit, on which two events come at one instant. A small
+    disturbance decides which of them comes first, and each order has a derivative of its own. Multipliers,
+    logarithms and the fundamental matrix are those of the order in ``transitions``.
 
     Attributes
     ----------
@@ -70,7 +74,8 @@ class PeriodicOrbit:
     transitions
         Names of the transitions in the order they fire.
     status
-        Whether Newton's method converged, and how far it got if not.
+        Whether Newton's method converged, and how far it got if not; ``AMBIGUOUS_ORDER`` for an orbit whose
+        derivative depends on the order of two events.
     turns
         Whole turns of each angle of the system over the period, by name.
 
@@ -113,6 +118,11 @@ class PeriodicOrbit:
         return labelled_orbit(self)
 
     @property
+    def closes(self) -> bool:
+        """Whether there is an orbit."""
+        return closes(self.status)
+
+    @property
     def forcing_periods(self) -> int:
         """Number of forcing periods until the orbit closes; 0 for an autonomous system."""
         forcing = self.system.forcing_period(self.parameters)
@@ -134,7 +144,7 @@ class PeriodicOrbit:
             If the orbit has not converged, a parameter does not exist, or the orbit is not isolated: a
             multiplier is 1, besides the one along an autonomous orbit.
         """
-        if not self.status.ok:
+        if not self.closes:
             raise ArgumentError(f"The orbit has not converged: {self.status.message}")
         given = arguments.items("names", names, "be names of parameters", least=1)
         for name in given:
@@ -149,15 +159,40 @@ class PeriodicOrbit:
 
     def arc(self, solver: Solver | None = None) -> HybridArc:
         """The orbit over one period; if it jumps at its point, from just after these jumps."""
-        after = self.t0 + max(MOMENT * self.period, ROUNDING_OF_TIME * math.ulp(abs(self.t0) + self.period))
-        start = self._run(self.x0, self.t0, after, self.mode, solver)
-        if len(start.jumps) == 0 or not start.status.ok:
-            return self._run(self.x0, self.t0, self.t0 + self.period, self.mode, solver)
-        # The same jumps come just before the end.
-        return self._run(start.x[-1], after, after + self.period, str(start.mode[-1]), solver)
+        start, end = self._first_moment(solver), self.t0 + self.period
+        after = float(start.t[-1])
+        arc = self._run(start.x[-1], after, after + self.period, str(start.mode[-1]), solver)
+        # Rounding may put a jump at the point to either side of the end.
+        jumps = len(start.jumps) > 0 or bool(np.any(np.abs(arc.jumps.t - end) <= after - self.t0))
+        return arc if jumps and start.status.ok else self._run(self.x0, self.t0, end, self.mode, solver)
+
+    @property
+    def moment(self) -> float:
+        """A time after which a run is clear of the guards of jumps at its start."""
+        return max(MOMENT * self.period, ROUNDING_OF_TIME * math.ulp(abs(self.t0) + self.period))
+
+    def _first_moment(self, solver: Solver | None) -> HybridArc:
+        return self._run(self.x0, self.t0, self.t0 + self.moment, self.mode, solver)
 
     def _run(self, x: np.ndarray, t: float, end: float, mode: str, solver: Solver | None) -> HybridArc:
         return simulate(self.system, x, (t, end), mode=mode, parameters=self.parameters, solver=solver)
+
+
+def first_start(points: Iterable[tuple[PeriodicOrbit, Sequence[str]]]) -> PeriodicOrbit:
+    """The first of some points of an orbit from which a run makes the jumps at once that it is to make there.
+
+    On a guard or a tick a state may be no start: a clock does not tick at the start of a run, and a guard of
+    time alone that is zero there fires, also after its jump.
+    """
+    for orbit, names in points:
+        if [str(name) for name in orbit._first_moment(None).jumps.transition] == list(names):
+            break
+    return orbit
+
+
+def closes(status: Status) -> bool:
+    """Whether a status is that of an orbit."""
+    return status.ok or status.code == StatusCode.AMBIGUOUS_ORDER
 
 
 def unaged(orbits: Sequence[PeriodicOrbit]) -> list[PeriodicOrbit]:

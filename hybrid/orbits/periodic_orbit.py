@@ -52,8 +52,10 @@ def periodic_orbit(
     system, parameters
         As for :func:`hybrid.simulate`.
     x0, mode
-        Guess of a point of the orbit ``(n,)``, and the mode there. If the orbit of a forced system jumps at
-        ``t0``, its point is the state before the jump. At the guess its mode is entered.
+        Guess of a point of the orbit ``(n,)``, and the mode there; at the guess its mode is entered. If the
+        orbit of a forced system jumps at ``t0``, its point is the state before or after the jump: the one
+        that is in the mode of the guess and nearer to it, if a run may start there. No run starts just before
+        a tick of a clock.
     t0, periods
         Time at the guess, and number of forcing periods (forced systems).
     period
@@ -71,9 +73,10 @@ def periodic_orbit(
     -------
     PeriodicOrbit
         It closes up to whole turns of the angles that the system declares, and counters go on counting. If
-        Newton's method did not converge the status says how far it came. An equilibrium of a forced system
-        counts as an orbit, because it repeats after each forcing period; an equilibrium of an autonomous
-        system does not.
+        Newton's method did not converge the status says how far it came. The status is ``AMBIGUOUS_ORDER``
+        where two events come at one instant and each order has a derivative of its own. An equilibrium of a
+        forced system counts as an orbit, because it repeats after each forcing period; an equilibrium of an
+        autonomous system does not.
 
     Raises
     ------
@@ -116,7 +119,7 @@ def periodic_orbit(
         compile_system(system)
         _check_clocks(system, state, parameters, t0, point.period)
         with CTRL_C:
-            return _shown(shooting.hinted(shooting.newton(point, False, tolerance, max_iterations), point))
+            return _shown(shooting.hinted(shooting.forced(point, tolerance, max_iterations), point))
     ticking = [each.name for each in system.transitions if each.clock and not each.clock.counts_from_entry]
     if ticking:
         raise ArgumentError(

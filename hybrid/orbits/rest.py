@@ -8,7 +8,6 @@ import attrs
 import numpy as np
 
 from hybrid.kernels.types import codes
-from hybrid.orbits.closing import jumps_at_once, same_time
 from hybrid.simulation.periods import split_time
 from hybrid.simulation.trajectory import Trajectory
 
@@ -73,9 +72,6 @@ def _integrals(trajectory: Trajectory, times: np.ndarray) -> tuple[np.ndarray, n
     """
     n = trajectory.system.tangent_dimension
     fine, coarse, size = (np.zeros((n, 1 + n)) for _ in range(3))
-    repeats = jumps_at_once(trajectory)
-    changed = _jumped(trajectory) if repeats else np.zeros((n, 1 + n))
-    fine, coarse = fine + changed, coarse + changed
     for begin, stop in pairwise(times):
         first = _rates(trajectory)
         if _to(trajectory, 0.5 * (begin + stop)) != codes.DONE:
@@ -86,10 +82,10 @@ def _integrals(trajectory: Trajectory, times: np.ndarray) -> tuple[np.ndarray, n
         fine += length / 6 * (first + 4 * middle + last)
         coarse += length / 2 * (first + last)
         size += length * np.abs(middle)
-        if code == codes.MAX_JUMPS and not (repeats and same_time(stop, times[-1], trajectory.model.period)):
+        if code == codes.MAX_JUMPS:
             changed = _jumped(trajectory)
             fine, coarse = fine + changed, coarse + changed
-        elif code not in (codes.DONE, codes.MAX_JUMPS):
+        elif code != codes.DONE:
             return fine * np.nan, coarse, size
     return fine, coarse, size
 

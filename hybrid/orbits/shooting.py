@@ -8,17 +8,17 @@ import attrs
 import numpy as np
 
 from hybrid.errors import ArgumentError
-from hybrid.orbits.closing import advance_to_close, same_time
-from hybrid.orbits.factors import fundamental_eigenvalues
+from hybrid.orbits.asked import Asked
+from hybrid.orbits.continuation.family import Family
+from hybrid.orbits.continuation.order import order_status
+from hybrid.orbits.continuation.route import accumulating
 from hybrid.orbits.held import Held, held_by
+from hybrid.orbits.lap import Fired, Lap, lap_of
 from hybrid.orbits.newton import ROUNDING_OF_GAP, Newton, Point, Shot, length
-from hybrid.orbits.orbit import PeriodicOrbit, turns_over
-from hybrid.orbits.periodic_schur import ProductEigenvalues
+from hybrid.orbits.orbit import PeriodicOrbit, closes, turns_over
 from hybrid.orbits.rest import EPSILON, drift
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.ending import status_of
-from hybrid.simulation.jumps import Jump
-from hybrid.simulation.periods import split_time
 from hybrid.simulation.simulate import simulate
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
@@ -70,7 +70,8 @@ HOLD_IT = (
 class Shooting:
     """Searches for orbits of one system, with the conserved quantities that are held.
 
-    Counters are no unknowns: they begin with ``counters``, and end with whatever they have counted.
+    Counters are no unknowns: they begin with ``counters``, and end with whatever they have counted. A search
+    that goes on at another time than that of the guess gives the orbit's point that was ``asked`` for.
     """
 
     system: HybridSystem
@@ -79,6 +80,7 @@ class Shooting:
     solver: Solver
     counters: np.ndarray
     held: Held | None = None
+    asked: Asked | None = None
 
     def whole(self, point: Point) -> np.ndarray:
         """The state at a point, with the counters."""
@@ -88,7 +90,7 @@ class Shooting:
         """One run over the period of a point, with the columns of the identity."""
         trajectory, n = self._trajectory(point, self.mode), self.system.tangent_dimension
         mode, field = trajectory.mode, trajectory.field()[:n]
-        code = advance_to_close(trajectory, *split_time(point.t + point.period, trajectory.model.period))
+        code = trajectory.advance(point.t + point.period, trajectory.no_record())
         arc = self._follow(point, point.period, mode)
         states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], SAMPLES))])[:, :n]
         extent, magnitude = np.ptp(states, axis=0), np.abs(states).max(axis=0)
@@ -144,7 +146,7 @@ class Shooting:
         if held is None or FAMILY not in found.status.message:
             return found
         other = attrs.evolve(self, held=held)._search(shot, False, tolerance, max_iterations)
-        return other if other.status.ok else found
+        return other if other.closes else found
 
     def _search(self, shot: Shot, free_period: bool, tolerance: float, max_iterations: int) -> PeriodicOrbit:
         """Newton's method from the first shot."""
@@ -205,8 +207,8 @@ class Shooting:
 
         At a jump the end of the shot would depend discontinuously on the period.
         """
-        shift = self._quiet_time(guess)
-        shooting, moved = self._moved(guess, shift)
+        shooting, moved = self._moved(guess, self._quietest_time(guess))
+        moved = attrs.evolve(moved, period=shooting._time_of_return(moved))
         orbit = shooting.newton(moved, True, tolerance, max_iterations)
         if orbit.period < SHORTEST_PERIOD * guess.period:
             # Every point closes after no time at all.
@@ -216,9 +218,22 @@ class Shooting:
                 "Start nearer to the orbit, with a better guess of its period.",
             )
             return attrs.evolve(orbit, status=status)
-        if not orbit.status.ok:
+        if not orbit.closes:
             return orbit
         return self._nearest(orbit, guess)
+
+    def forced(self, guess: Point, tolerance: float, max_iterations: int) -> PeriodicOrbit:
+        """Newton's method from a point of the guess's orbit that is not near a jump, the period being known.
+
+        The equation of a shot that begins near a jump depends on which side of the jump the shot begins on.
+        """
+        shift = self._quiet_time(guess)
+        if shift == 0.0:
+            return self.newton(guess, False, tolerance, max_iterations)
+        mode = self._trajectory(guess, self.mode).mode
+        shooting, moved = self._moved(guess, shift)
+        asked = Asked(guess, mode, self.counters)
+        return attrs.evolve(shooting, asked=asked).newton(moved, False, tolerance, max_iterations)
 
     def hinted(self, orbit: PeriodicOrbit, guess: Point) -> PeriodicOrbit:
         """The orbit, with a remedy for a search that failed since a component counts turns."""
@@ -246,17 +261,29 @@ class Shooting:
         )
 
     def _quiet_time(self, guess: Point) -> float:
-        """Time after the guess at which neither it nor one period later is close to a jump."""
+        """The first time after the guess with jumps at least half as far as anywhere; 0 without jumps."""
         arc = self._follow(guess, 2 * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
-        jumps = np.concatenate([[0.0], arc.jumps.t - guess.t])
-        candidates = np.linspace(0, guess.period, 201)[1:-1]
+        if len(arc.jumps) == 0 or not arc.status.ok:
+            return 0.0
+        candidates, distance = self._quietness(arc, guess, arc.jumps.t - guess.t)
+        return float(candidates[np.flatnonzero(distance >= 0.5 * distance.max())[0]])
+
+    def _quietest_time(self, guess: Point) -> float:
+        """The time after the guess at which neither it nor one period later is close to a jump."""
+        arc = self._follow(guess, 2 * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
+        candidates, distance = self._quietness(arc, guess, np.concatenate([[0.0], arc.jumps.t - guess.t]))
+        return float(candidates[np.argmax(distance)])
+
+    def _quietness(self, arc: HybridArc, guess: Point, jumps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Times after the guess, and how far they and those one period later are from jumps."""
+        candidates = np.linspace(0, guess.period, 201)[:-1]
         at = np.searchsorted(arc.t, guess.t + candidates, side="right") - 1
         candidates = candidates[self._is_ageless(arc.mode[at])]
         distance = np.minimum(
             np.abs(candidates[:, None] - jumps).min(axis=1),
             np.abs(candidates[:, None] + guess.period - jumps).min(axis=1),
         )
-        return float(candidates[np.argmax(distance)])
+        return candidates, distance
 
     def _is_ageless(self, modes: np.ndarray) -> np.ndarray:
         """In which of these modes the state has no age, ``(N,)``; all count if it has one everywhere."""
@@ -269,8 +296,7 @@ class Shooting:
         arc = self._follow(guess, shift, self.mode)
         state, counters = np.split(arc.x[-1], [self.system.tangent_dimension])
         shooting = attrs.evolve(self, mode=str(arc.mode[-1]), counters=counters)
-        moved = Point(state, guess.t + shift, guess.period)
-        return shooting, attrs.evolve(moved, period=shooting._time_of_return(moved))
+        return shooting, Point(state, guess.t + shift, guess.period)
 
     def _time_of_return(self, guess: Point) -> float:
         """The guessed period, or a time near it at which the solution returns much nearer to its start.
@@ -303,11 +329,22 @@ class Shooting:
         return attrs.evolve(orbit, x0=arc.x[i], mode=str(arc.mode[i]), t0=float(arc.t[i]))
 
     def _result(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> PeriodicOrbit:
-        eigenvalues, jumps = self._eigenvalues(shot), self._jumps(shot)
+        lap, jumps = self._lap(shot)
+        orbit = self._orbit(lap, lap.jumps or jumps, shot)
         status = self._status(shot, newton, iterations, tolerance)
+        if closes(status) and lap.orbit is not None and lap.orbit.has_meetings:
+            lap = lap.in_order_of(orbit.arc())
+            orbit = self._orbit(lap, lap.jumps or jumps, shot)
         if status.ok:
-            status = self._explained(status, shot, newton, eigenvalues.values)
-        return PeriodicOrbit(
+            status = self._explained(status, shot, newton, orbit.multipliers)
+        if status.ok and lap.orbit is not None:
+            status = order_status(lap.orbit) or status
+        return attrs.evolve(orbit, iterations=iterations, status=status)
+
+    def _orbit(self, lap: Lap, jumps: list[Fired], shot: Shot) -> PeriodicOrbit:
+        """A lap as an orbit, from the point that was asked for."""
+        eigenvalues = lap.eigenvalues
+        orbit = PeriodicOrbit(
             system=self.system,
             parameters=self._all_parameters(),
             x0=self.whole(shot.point),
@@ -316,24 +353,34 @@ class Shooting:
             period=float(shot.point.period),
             multipliers=eigenvalues.values,
             log_moduli=eigenvalues.log_moduli,
-            fundamental=shot.fundamental,
+            fundamental=lap.fundamental(0),
             residual=length(shot.gap),
-            iterations=iterations,
+            iterations=0,
             signature=(shot.mode, *(jump.target for jump in jumps if jump.target is not None)),
             transitions=tuple(jump.transition for jump in jumps),
-            status=status,
+            status=shot.status,
             turns=turns_over(self.system, shot.end - shot.point.x),
         )
+        if self.asked is None or lap.orbit is None:
+            return orbit
+        return self.asked.answered(orbit, lap, jumps, shot)
+
+    def _lap(self, shot: Shot) -> tuple[Lap, list[Fired]]:
+        """The run over the period, stretch by stretch and cut at the time of the guess, and its jumps."""
+        point, jumps = shot.point, self._follow(shot.point, shot.point.period, shot.mode).jumps
+        stops = [point.t + point.period]
+        if self.asked is not None and not any(self.asked.is_at(jump.t) for jump in jumps):
+            stops = [self.asked.t, *stops]
+        periods = 0 if self.system.forcing_period(self.parameters) is None else 1
+        family = Family(
+            self.system, (), self._all_parameters(), periods, self.solver, (), least=shot.magnitude
+        )
+        lap = lap_of(family, lambda: self._trajectory(point, shot.mode), stops, accumulating(jumps))
+        return lap, [Fired(jump.t, jump.transition, jump.target) for jump in jumps]
 
     def _all_parameters(self) -> dict[str, float]:
         values = self.system.parameter_values(self.parameters).tolist()
         return dict(zip(self.system.parameters, values, strict=True))
-
-    def _eigenvalues(self, shot: Shot) -> ProductEigenvalues:
-        """Those of the fundamental matrix from its factors, or nan where the run does not reach its end."""
-        return fundamental_eigenvalues(
-            lambda: self._trajectory(shot.point, shot.mode), shot.point.t + shot.point.period
-        )
 
     def _drifts(self, shot: Shot, newton: Newton, tolerance: float) -> bool:
         """Whether the part of the gap that no step removes is more than the error of the solver.
@@ -346,15 +393,6 @@ class Shooting:
         rough, drift = (newton.drift(shot, each, np.sqrt(tolerance)) for each in (shot, finer))
         noise = np.maximum(np.abs(rough - drift) / TIGHTER, shot.rounding[:, None])
         return bool(np.any(np.abs(drift) > noise))
-
-    def _jumps(self, shot: Shot) -> list[Jump]:
-        """The jumps of one period; those at its point are counted once."""
-        arc = self._follow(shot.point, shot.point.period, shot.mode)
-        jumps, begin, end = list(arc.jumps), shot.point.t, shot.point.t + shot.point.period
-        size = abs(begin) + shot.point.period
-        if jumps and same_time(jumps[0].t, begin, size):
-            jumps = [jump for jump in jumps if not same_time(jump.t, end, size)]
-        return jumps
 
     def _follow(self, point: Point, span: float, mode: str | None, max_jumps: int = 100_000) -> HybridArc:
         """The arc from a point over a time, without tangent vectors."""
@@ -370,7 +408,7 @@ class Shooting:
 
     def _status(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> Status:
         """How Newton's method ended: with an orbit, or why there is none."""
-        if not shot.status.ok:
+        if not shot.reached:
             return shot.status
         reason = self._objection(shot, newton, iterations, tolerance)
         if reason is None:

@@ -134,7 +134,7 @@ def plot_orbit(
     period = f"{orbit.period:.6g} {orbit.system.units.get('t', '')}".rstrip()
     # The row of the legend stands between the axes and the title.
     pad = 6.0 if ax.get_legend() is None else 24.0
-    told = f"period {period}, largest multiplier {number}" if orbit.status.ok else unfinished(orbit)
+    told = f"period {period}, largest multiplier {number}" if orbit.closes else unfinished(orbit)
     ax.set_title(told, loc="left", fontsize=9, pad=pad)
     return ax
 

@@ -56,8 +56,19 @@ def test_a_switch_stretches_areas():
         assert np.linalg.det(found) == pytest.approx(1 - 1 / rate, rel=1e-12)
 
 
-@pytest.mark.parametrize("rates", [EQUAL, UNEQUAL])
-def test_exponents(rates):
+@pytest.mark.parametrize("end", [3.0, 5.0, 9.0])
+def test_with_equal_rates_each_switch_doubles_areas(end):
+    """So ``ln 2`` times the switches per unit of time is the first exponent; the others are zero."""
+    arc = hybrid.simulate(
+        switched_arrival(), START, (0.0, end), mode="fill1", parameters=parameters(EQUAL), tangent=np.eye(3)
+    )
+    assert len(arc.jumps) > 1
+    areas = abs(np.linalg.det(arc.fundamental))
+    assert np.log2(areas) == pytest.approx(len(arc.jumps), abs=1e-6)
+
+
+def test_exponents():
+    rates = UNEQUAL
     result = lyapunov.lyapunov_spectrum(
         switched_arrival(), START, mode="fill1", parameters=parameters(rates), interval=1.0, intervals=5000
     )

@@ -96,7 +96,7 @@ def continue_orbit(
     True
     """
     arguments.instance("orbit", orbit, PeriodicOrbit, "Call periodic_orbit first.")
-    if not orbit.status.ok:
+    if not orbit.closes:
         raise ArgumentError(f"orbit has not converged: {orbit.status.message}")
     arguments.known("parameter: Parameter", parameter, orbit.system.parameters, "Parameters")
     ends = arguments.numbers("span", span, "be (low, high)")
@@ -116,6 +116,9 @@ def continue_orbit(
         if CTRL_C.is_set():
             return attrs.evolve(found, status=interrupted_status("the orbits so far"))
     status = _status(why)
+    order = next((found.orbit(i).status for i in (0, -1) if not found.orbit(i).status.ok), None)
+    if status.ok and order is not None:
+        status = attrs.evolve(order, message=f"{status.message} {order.message}")
     if not isolated:
         status = attrs.evolve(status, message=f"{status.message} {MANY}")
     return attrs.evolve(found, status=status)

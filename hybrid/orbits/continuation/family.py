@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any
@@ -21,6 +22,8 @@ from hybrid.system.graph import HybridSystem
 from hybrid.transform.extended import extended
 from hybrid.transform.restricted import restricted
 
+# A stretch that takes no more than these units in the last place of the time is a straight line.
+ULPS = 64
 # A field is along a surface if its rate through it is this share of its terms.
 ALONG = 1e-10
 # The corrections stop when they are this small.
@@ -74,7 +77,7 @@ class Family:
     @cached_property
     def extended(self) -> HybridSystem:
         """The system whose state ends with the free parameters."""
-        return extended(self.system, self.names)
+        return extended(self.system, self.names) if self.names else self.system
 
     @cached_property
     def compiled(self) -> CompiledSystem:
@@ -141,7 +144,7 @@ class Family:
                 for i, stretch in enumerate(self.route)
             )
             landings = tuple(
-                self._landing(stretch, flow, float(loop.times[i + 1]), loop.values)
+                self.landing(stretch, flow, float(loop.times[i + 1]), loop.values)
                 for i, (stretch, flow) in enumerate(zip(self.route, flows, strict=True))
             )
         except ArithmeticError:
@@ -183,8 +186,10 @@ class Family:
         mode = self.extended.mode_index(stretch.mode)
         last_mode = self.extended.mode_index(stretch.end_mode)
         first_rate = self._rate(mode, begin, state)
-        if begin == end:
-            return Flow(None, x, np.eye(n, n + len(values)), first_rate, self._rate(last_mode, end, state))
+        if no_time(begin, end):
+            last_rate = self._rate(last_mode, end, state)
+            moved = x + (end - begin) * first_rate
+            return Flow(None, moved, np.eye(n, n + len(values)), first_rate, last_rate, stretch.counters)
         forwards = end > begin
         system = restricted(self.extended, stretch.mode, stretch.within, backwards=not forwards)
         arc = self._run(system, stretch.mode, state, (begin, end) if forwards else (-begin, -end), True)
@@ -194,43 +199,62 @@ class Family:
         found = arc.x[-1, :n], arc.fundamental[:n], first_rate, self._rate(last_mode, end, arc.x[-1])
         if not all(np.all(np.isfinite(each)) for each in found):
             raise ArithmeticError
-        return Flow(arc, *found)
+        return Flow(arc, *found, tuple(arc.x[-1, n + len(values) :].tolist()))
 
-    def _landing(self, stretch: Stretch, flow: Flow, t: float, values: np.ndarray) -> Landing | None:
+    def landing(self, stretch: Stretch, flow: Flow, t: float, values: np.ndarray) -> Landing | None:
         """The jumps at the end of a stretch."""
         if not stretch.fired:
             return None
-        system, compiled, p = self.extended, self.compiled, self._others
-        n, state = self.n, self.extended_state(np.append(flow.end, stretch.counters), values)
-        if flow.arc is not None:
-            # Jumps that accumulate within the stretch may have counted.
-            state = np.append(state[: n + len(values)], flow.arc.x[-1, n + len(values) :])
-        whole = moved = np.eye(len(state), len(state) + 1)
-        parts: list[tuple[np.ndarray, np.ndarray, np.ndarray | None]] = []
-        height, first, own = 0.0, np.zeros(len(state) + 1), np.zeros(len(state) + 1)
-        for number, name in enumerate(stretch.fired):
-            index = system.transition_index(name)
-            transition = system.transitions[index]
-            guard = guard_function(transition)
-            value = float(compiled.value(guard, index, t, state, p)[0])
-            gradient = compiled.derivative(guard, index, t, state, p)[0]
-            if number == 0:
-                height, first, own = value, gradient, gradient
-            elif abs(value) <= CLOSED * float(np.abs(gradient[:-1]) @ np.abs(state)):
-                # It is met by itself, by chance or by symmetry: the last jump did not set it off.
-                rate = self._rate(system.mode_index(transition.source), t, state)
-                parts.append((self._without_counters(moved[:n]), self._without_counters(own), rate))
-                moved, own = np.eye(len(state), len(state) + 1), gradient
-            reset = reset_function(transition, system.variables)
-            if reset is not None:
-                slopes = compiled.derivative(reset, index, t, state, p)
-                state = compiled.value(reset, index, t, state, p)
-                whole, moved = (_after(slopes, each) for each in (whole, moved))
-        moved, own, whole, first = map(self._without_counters, (moved[:n], own, whole[:n], first))
-        parts.append((moved, own, None))
-        if not (np.isfinite(height) and np.all(np.isfinite(first)) and np.all(np.isfinite(whole))):
+        state = self.extended_state(np.append(flow.end, flow.counters), values)
+        whole = np.eye(len(state), len(state) + 1)
+        height, gradient = self._guard(stretch.fired[0], t, state)
+        for name in stretch.fired:
+            state, slopes = self._reset(name, t, state)
+            if slopes is not None:
+                whole = _after(slopes, whole)
+        whole, gradient = map(self._without_counters, (whole[: self.n], gradient))
+        if not (np.isfinite(height) and np.all(np.isfinite(gradient)) and np.all(np.isfinite(whole))):
             raise ArithmeticError
-        return Landing(state[:n], whole, height, first, tuple(parts))
+        return Landing(state[: self.n], whole, height, gradient)
+
+    def by_themselves(
+        self, stretch: Stretch, flow: Flow, t: float, values: np.ndarray, span: float
+    ) -> list[tuple[Stretch, np.ndarray]]:
+        """The end of a stretch as the instants that are met by themselves, by chance or by symmetry.
+
+        On neighbouring orbits each has a time of its own; all but these are set off by the one before them.
+        With each, the state ``(n,)`` that it begins with. ``span`` is the time that the orbit takes.
+        """
+        state = self.extended_state(np.append(flow.end, flow.counters), values)
+        sizes = np.append(np.abs(state), abs(span))
+        sizes[: self.n] = np.maximum(sizes[: self.n], self.least)
+        found = [(attrs.evolve(stretch, fired=()), flow.end)]
+        for name in stretch.fired:
+            source = self.extended.transitions[self.extended.transition_index(name)].source
+            height, gradient = self._guard(name, t, state)
+            if found[-1][0].fired and abs(height) <= CLOSED * float(np.abs(gradient) @ sizes):
+                counters = tuple(state[self.n + len(values) :].tolist())
+                found.append((Stretch(source, source, (), (), counters), state[: self.n]))
+            last, begun = found[-1]
+            found[-1] = attrs.evolve(last, fired=(*last.fired, name)), begun
+            state, _ = self._reset(name, t, state)
+        return found
+
+    def _guard(self, name: str, t: float, state: np.ndarray) -> tuple[float, np.ndarray]:
+        """The guard of a transition, and its derivatives in the extended state and the time."""
+        index = self.extended.transition_index(name)
+        function = guard_function(self.extended.transitions[index])
+        height = self.compiled.value(function, index, t, state, self._others)[0]
+        return float(height), self.compiled.derivative(function, index, t, state, self._others)[0]
+
+    def _reset(self, name: str, t: float, state: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+        """The extended state after a transition, and its derivatives; None for the identity."""
+        index = self.extended.transition_index(name)
+        reset = reset_function(self.extended.transitions[index], self.extended.variables)
+        if reset is None:
+            return state, None
+        slopes = self.compiled.derivative(reset, index, t, state, self._others)
+        return self.compiled.value(reset, index, t, state, self._others), slopes
 
     @cached_property
     def _others(self) -> np.ndarray:
@@ -263,17 +287,11 @@ class Family:
 
     def height(self, name: str, t: float, x: np.ndarray, values: np.ndarray) -> float:
         """The guard of a transition."""
-        index = self.extended.transition_index(name)
-        function = guard_function(self.extended.transitions[index])
-        state = self.extended_state(x, values)
-        return float(self.compiled.value(function, index, t, state, self._others)[0])
+        return self._guard(name, t, self.extended_state(x, values))[0]
 
     def gradient(self, name: str, t: float, x: np.ndarray, values: np.ndarray) -> np.ndarray:
         """Derivatives ``(n + 1,)`` of the guard of a transition in the state and the time."""
-        index = self.extended.transition_index(name)
-        function = guard_function(self.extended.transitions[index])
-        state = self.extended_state(x, values)
-        found = self.compiled.derivative(function, index, t, state, self._others)[0]
+        found = self._guard(name, t, self.extended_state(x, values))[1]
         return np.delete(found, np.s_[self.n : len(found) - 1])
 
     def _run(
@@ -291,6 +309,11 @@ class Family:
             )
         except ArgumentError as error:
             raise ArithmeticError from error
+
+
+def no_time(begin: float, end: float) -> bool:
+    """Whether two times are the same but for rounding."""
+    return abs(end - begin) <= ULPS * math.ulp(max(abs(begin), abs(end)))
 
 
 def _after(slopes: np.ndarray, before: np.ndarray) -> np.ndarray:

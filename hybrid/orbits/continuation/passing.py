@@ -35,6 +35,8 @@ class Flow:
         Derivatives ``(n, n + k)`` of that in the start and the parameters, at fixed times.
     first_rate, last_rate
         The field ``(n,)`` at the two ends.
+    counters
+        Values of the counters at the end: jumps that accumulate within the stretch may have counted.
     """
 
     arc: HybridArc | None
@@ -42,6 +44,7 @@ class Flow:
     slopes: np.ndarray
     first_rate: np.ndarray
     last_rate: np.ndarray
+    counters: tuple[float, ...] = ()
 
     def at(self, shares: np.ndarray) -> np.ndarray:
         """States ``(N, n)`` at shares ``(N,)`` of the time."""
@@ -63,18 +66,14 @@ class Landing:
     slopes
         Derivatives ``(n, n + k + 1)`` of that in the state before, the parameters and the time.
     height, gradient
-        The guard of the first of them, and its derivatives ``(n + k + 1,)`` in the same.
-    parts
-        The jumps as those that move by themselves: each with what a jump sets off at its instant, as the
-        derivatives ``(n, n + k + 1)`` of the state after in that before, the gradient of its guard, and the
-        field after it ``(n,)``, None after the last.
+        The guard of the first of them, and its derivatives ``(n + k + 1,)`` in the same. The first sets off
+        all others.
     """
 
     after: np.ndarray
     slopes: np.ndarray
     height: float
     gradient: np.ndarray
-    parts: tuple[tuple[np.ndarray, np.ndarray, np.ndarray | None], ...]
 
 
 @attrs.frozen(eq=False)
@@ -104,6 +103,58 @@ class Pass:
         shares = np.linspace(0.0, 1.0, LOOKED_AT)
         states = [flow.at(shares) for flow in self.flows if flow.arc is not None]
         return np.asarray(np.abs(np.concatenate([self.loop.x, *states])).max(axis=0))
+
+    @property
+    def parted(self) -> Pass:
+        """The same orbit, with a stretch that takes no time between events that meet by themselves."""
+        family, loop = self.family, self.loop
+        stretches: list[Any] = []
+        states, times, flows = [], [], []
+        for i, (stretch, flow) in enumerate(zip(family.route, self.flows, strict=True)):
+            end = float(loop.times[i + 1])
+            parts = family.by_themselves(stretch, flow, end, loop.values, loop.period)
+            stretches += [each for each, _ in parts]
+            states += [loop.x[i], *(x for _, x in parts[1:])]
+            times += [loop.times[i], *([end] * (len(parts) - 1))]
+            flows += [flow, *(family.flow(each, x, end, end, loop.values) for each, x in parts[1:])]
+        family = attrs.evolve(family, route=tuple(stretches))
+        loop = Loop(np.array(states), np.array([*times, loop.times[-1]]), loop.values)
+        landings = tuple(
+            family.landing(stretch, flow, float(t), loop.values)
+            for stretch, flow, t in zip(stretches, flows, loop.times[1:], strict=True)
+        )
+        return Pass(family, loop, tuple(flows), landings)
+
+    @property
+    def has_meetings(self) -> bool:
+        """Whether events meet at one instant by themselves."""
+        return bool(np.any(np.diff(self.loop.times) <= CLOSED * self.loop.period))
+
+    def in_order_of(self, arc: HybridArc) -> Pass:
+        """The same orbit, with events that meet at one instant in the order in which a run around makes them.
+
+        Rounding decides that order. The events may be other transitions then, through other modes.
+        """
+        route, period = self.family.route, self.loop.period
+        lasting = np.flatnonzero(np.diff(self.loop.times) > CLOSED * period)
+        ends, stretches, changed = [*lasting[1:], len(route)], [], False
+        for i, after in zip(lasting.tolist(), ends, strict=True):
+            fired = tuple(name for stretch in route[i:after] for name in stretch.fired)
+            late = (arc.jumps.t - self.loop.times[i + 1] + 0.5 * period) % period - 0.5 * period
+            jumps = [arc.jumps[int(j)] for j in np.flatnonzero(np.abs(late) <= CLOSED * period)]
+            if after > i + 1 and jumps and not route[i].within:
+                ends_meet = jumps[0].source, jumps[-1].target
+                names = tuple(jump.transition for jump in jumps)
+                if names != fired and ends_meet == (route[i].end_mode, route[after % len(route)].mode):
+                    fired, changed = names, True
+            stretches.append(attrs.evolve(route[i], fired=fired))
+        if not changed or lasting[0] != 0:
+            return self
+        flows = tuple(self.flows[i] for i in lasting)
+        times = np.append(self.loop.times[lasting], self.loop.times[-1])
+        loop = Loop(self.loop.x[lasting], times, self.loop.values)
+        family = attrs.evolve(self.family, route=tuple(stretches))
+        return Pass(family, loop, flows, (None,) * len(flows)).parted
 
     def units(self, sizes: np.ndarray) -> np.ndarray:
         """Units of the unknowns, for parameters of the ``sizes (k,)``.
@@ -147,15 +198,11 @@ class Pass:
             if landing is None:
                 found.append(np.eye(n))
                 continue
-            product, before = np.eye(n), flow.last_rate
-            for moved, gradient, rate in landing.parts:
-                after = self.flows[(i + 1) % len(self.flows)].first_rate if rate is None else rate
-                late = after - moved[:, :n] @ before - moved[:, -1]
-                with np.errstate(all="ignore"):
-                    speed = gradient[:n] @ before + gradient[-1]
-                    product = (moved[:, :n] + np.outer(late, gradient[:n]) / speed) @ product
-                before = after
-            found.append(product)
+            before, after = flow.last_rate, self.flows[(i + 1) % len(self.flows)].first_rate
+            late = after - landing.slopes[:, :n] @ before - landing.slopes[:, -1]
+            with np.errstate(all="ignore"):
+                moved = np.outer(late, landing.gradient[:n]) / self.speed(i)
+            found.append(landing.slopes[:, :n] + moved)
         return found
 
     @cached_property
@@ -165,10 +212,11 @@ class Pass:
         pairs = zip(self.saltations, self.flows, strict=True)
         found = [saltation @ flow.slopes[:, :n] for saltation, flow in pairs]
         if all(landing is None for landing in self.landings):
-            found[-1] = self._onto_its_surface() @ found[-1]
+            found[-1] = self.onto_its_surface @ found[-1]
         return found
 
-    def _onto_its_surface(self) -> np.ndarray:
+    @property
+    def onto_its_surface(self) -> np.ndarray:
         """The projection ``(n, n)`` onto the surface that an orbit without jumps stays on; else the identity.
 
         Other orbits come to such a surface by a jump, which forgets how far they were from it.

@@ -255,12 +255,13 @@ def start_of(family: Family, arc: HybridArc, period: float, values: np.ndarray) 
     """The family and the unknowns of the orbit that a run over one period shows; None if it has no value."""
     route, x, times = route_of(family.system, arc, period)
     counted = (arc.x[-1] - arc.x[0])[family.n :]
-    family = attrs.evolve(family, route=route, counted=counted)
+    least = np.abs(arc.x[:, : family.n]).max(axis=0)
+    family = attrs.evolve(family, route=route, counted=counted, least=least)
     first = family.around(Loop(x, times, values))
     if first is None:
         return None
-    family = attrs.evolve(family, least=first.scale)
-    return _divided(attrs.evolve(first, family=family))
+    first = first.parted
+    return _divided(attrs.evolve(first, family=attrs.evolve(first.family, least=first.scale)))
 
 
 def _divided(orbit: Pass) -> tuple[Family, Loop]:
@@ -305,14 +306,17 @@ def refined(place: Place) -> Place:
 
 
 def share_of(orbit: Pass, t: float) -> tuple[int, float]:
-    """The stretch at a time, whole periods aside, and the share of the stretch before it."""
-    times = orbit.loop.times
-    after = (t - times[0]) % orbit.loop.period
-    # The end of the last stretch is the begin of the first one: what is this near to it is there.
-    t = times[0] + (after if after < (1.0 - CLOSED) * orbit.loop.period else 0.0)
-    i = min(max(int(np.searchsorted(times, t, side="right")) - 1, 0), len(times) - 2)
-    length = times[i + 1] - times[i]
-    return i, float((t - times[i]) / length) if length > 0.0 else 0.0
+    """The stretch at a time, whole periods aside, and the share of the stretch before it.
+
+    What is no farther than rounding from the end of a stretch is at the begin of the next one, after the
+    jumps: the state before them need not be a start, since a clock does not tick at the start of a run.
+    """
+    times, period = orbit.loop.times, orbit.loop.period
+    least = CLOSED * period
+    after = (t - times[0]) % period
+    t = times[0] + (after if after < period - least else 0.0)
+    i = min(max(int(np.searchsorted(times, t + least, side="right")) - 1, 0), len(times) - 2)
+    return i, float((t - times[i]) / (times[i + 1] - times[i])) if t > times[i] + least else 0.0
 
 
 def moment(orbit: Pass, i: int, share: float) -> tuple[float, np.ndarray]:
@@ -337,12 +341,15 @@ def is_real(orbit: Pass) -> bool:
     """Whether the system itself goes this way.
 
     Each guard fires in its direction, and runs from the middle of each stretch to that of the next one jump
-    as the equations say. A run does not begin or end on a surface that the motion stays on, nor in a chatter.
+    as the equations say. A run does not begin or end on a surface that the motion stays on, in a chatter, or
+    between events that meet at one instant.
     """
-    loop, route = orbit.loop, orbit.family.route
-    if np.any(np.diff(loop.times) <= 0.0) or not all(map(orbit.fires_in_direction, range(len(route)))):
+    route, stays = orbit.family.route, np.diff(orbit.loop.times)
+    least = CLOSED * orbit.loop.period
+    if np.any(stays < -least) or not all(map(orbit.fires_in_direction, range(len(route)))):
         return False
-    free = [i for i, stretch in enumerate(route) if not stretch.within and not slides(orbit, i)] or [0]
+    lasting = [i for i, stretch in enumerate(route) if stays[i] > least and not stretch.within]
+    free = [i for i in lasting if not slides(orbit, i)] or [0]
     return all(_goes(orbit, i, after) for i, after in pairwise([*free, free[0] + len(route)]))
 
 
@@ -364,14 +371,49 @@ def _goes(orbit: Pass, first: int, last: int) -> bool:
         solver=family.solver,
     )
     passed = {name for stretch in route for name in stretch.within}
-    jumps = [jump for jump in arc.jumps if jump.transition not in passed]
-    wanted = [
-        (name, loop.times[i % count + 1] + i // count * loop.period)
-        for i in range(first, last)
-        for name in route[i % count].fired
-        if name not in passed
+    jumps = [
+        _Event(float(jump.t), (jump.transition,), jump.target)
+        for jump in arc.jumps
+        if jump.transition not in passed
     ]
-    if not arc.status.ok or [jump.transition for jump in jumps] != [name for name, _ in wanted]:
+    wanted = [
+        _Event(
+            float(loop.times[i % count + 1] + i // count * loop.period), names, route[(i + 1) % count].mode
+        )
+        for i in range(first, last)
+        if (names := tuple(name for name in route[i % count].fired if name not in passed))
+    ]
+    least = CLOSED * loop.period
+    instants = [_instants(jumps, least), _instants(wanted, least)]
+    if not arc.status.ok or len(instants[0]) != len(instants[1]):
         return False
-    late = [abs(jump.t - t) for jump, (_, t) in zip(jumps, wanted, strict=True)]
-    return max(late, default=0.0) <= SAME_TIME * loop.period
+    return all(
+        abs(one[0].t - other[0].t) <= SAME_TIME * loop.period and _same(one, other)
+        for one, other in zip(*instants, strict=True)
+    )
+
+
+@attrs.frozen
+class _Event:
+    """Transitions that fire at a time, and the mode after them."""
+
+    t: float
+    names: tuple[str, ...]
+    mode: str | None
+
+
+def _instants(events: list[_Event], least: float) -> list[list[_Event]]:
+    """The events by instants, which are more than a time apart."""
+    groups: list[list[_Event]] = []
+    for event in events:
+        if groups and event.t - groups[-1][-1].t <= least:
+            groups[-1].append(event)
+        else:
+            groups.append([event])
+    return groups
+
+
+def _same(made: list[_Event], wanted: list[_Event]) -> bool:
+    """Whether the jumps of an instant are those wanted: events that meet there may come in any order."""
+    names = [[name for event in events for name in event.names] for events in (made, wanted)]
+    return names[0] == names[1] or (len(wanted) > 1 and made[-1].mode == wanted[-1].mode)

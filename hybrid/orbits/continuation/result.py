@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import attrs
 import numpy as np
 
-from hybrid.orbits.continuation.passing import Pass
+from hybrid.orbits.continuation.order import order_status
+from hybrid.orbits.continuation.passing import CLOSED, Pass
 from hybrid.orbits.continuation.place import moment, share_of
 from hybrid.orbits.continuation.route import Route
-from hybrid.orbits.orbit import PeriodicOrbit, turns_over, unaged
+from hybrid.orbits.orbit import PeriodicOrbit, first_start, turns_over, unaged
 from hybrid.status import SUCCESS
 
 
@@ -42,9 +45,40 @@ def orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
 
 
 def whole_orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
-    """The orbit from the point that stands for it, with the age if the family has one."""
-    family, loop = orbit.family, orbit.loop
+    """The orbit from the point that stands for it, with the age if the family has one.
+
+    Events that meet at one instant are listed as the arc of the orbit shows them.
+    """
     i, share = points.at(orbit)
+    found = _start_from(orbit, i, share, points.t0)
+    if orbit.has_meetings:
+        other = orbit.in_order_of(found.arc())
+        i = next(j for j, flow in enumerate(other.flows) if flow is orbit.flows[i])
+        found, orbit = _start_from(other, i, share, points.t0), other
+    return attrs.evolve(found, status=order_status(orbit) or SUCCESS)
+
+
+def _start_from(orbit: Pass, i: int, share: float, t0: float) -> PeriodicOrbit:
+    """The orbit from a share of a stretch; if it jumps there, from after or before these jumps or later."""
+    found, stays = _orbit_from(orbit, i, share, t0), np.diff(orbit.loop.times)
+    if share > 0.0 or orbit.landings[i - 1] is None or not orbit.family.forced:
+        return found
+
+    def points() -> Iterator[tuple[PeriodicOrbit, Sequence[str]]]:
+        yield found, []
+        k, names = (i - 1) % len(stays), orbit.family.route[i - 1].fired
+        while stays[k] <= CLOSED * orbit.loop.period:
+            k = (k - 1) % len(stays)
+            names = (*orbit.family.route[k].fired, *names)
+        yield _orbit_from(orbit, k, 1.0, t0), names
+        yield _orbit_from(orbit, i, found.moment / float(stays[i]), t0 + found.moment), []
+
+    return first_start(points())
+
+
+def _orbit_from(orbit: Pass, i: int, share: float, t0: float) -> PeriodicOrbit:
+    """The orbit from a share of a stretch, or from a time if the system is forced."""
+    family, loop = orbit.family, orbit.loop
     (t, x), mode = moment(orbit, i, share), mode_at(orbit, i, share)
     multipliers = orbit.multipliers
     with np.errstate(divide="ignore"):
@@ -58,7 +92,7 @@ def whole_orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
         parameters=family.all_parameters(loop.values),
         x0=x,
         mode=mode,
-        t0=points.t0 if family.forced else t,
+        t0=t0 if family.forced else t,
         period=loop.period,
         multipliers=multipliers,
         log_moduli=moduli,

@@ -113,6 +113,13 @@ def instants(jumps: Sequence[Jump]) -> list[list[Jump]]:
     return groups
 
 
+def accumulating(jumps: Sequence[Jump]) -> tuple[str, ...]:
+    """Names of the transitions whose jumps accumulate at some limit of an orbit; empty if there is none."""
+    groups = instants(jumps)
+    last = max((i for i, group in enumerate(groups) if group[0].kind == "limit"), default=None)
+    return () if last is None else _accumulating([*groups[last + 1 :], *groups[: last + 1]])
+
+
 def _without_chatter(groups: list[list[Jump]]) -> tuple[list[list[Jump]], list[tuple[str, ...]]]:
     """The groups but those that accumulate, and the names of what accumulates before each of them.
 

@@ -451,3 +451,32 @@ def test_orbits_that_clocks_do_not_repeat_are_refused(clock, period, message):
 def test_a_period_of_zero_is_refused_at_the_run():
     with pytest.raises(ArgumentError, match="Transition 'off': Every: period must be positive"):
         hybrid.simulate(pwm(), (0.0,), (0.0, 1.0), parameters={"T": 0.0})
+
+
+@pytest.mark.parametrize("solver", [hybrid.DOP853(), hybrid.Tsit5(), hybrid.Taylor()])
+@pytest.mark.parametrize("tangent", [None, np.eye(1)])
+@pytest.mark.parametrize("begin", [0.35, 0.62, 300.71])
+def test_no_tick_is_lost_to_a_crossing_at_the_same_instant(begin, tangent, solver):
+    """Two modes take turns: the first edge, a tick or a crossing, leads on, and the other one leads back."""
+    edge, back = Guard(lambda t, x, p: x.phase - 1.0, +1), Reset(lambda t, x, p: {"phase": x.phase - 1.0})
+    fields = {"both": 1.0, "ticked": 1.3, "crossed": 0.7}
+    system = HybridSystem(
+        state=("phase",),
+        modes=[
+            Mode(name, lambda t, x, p, rate=rate: (rate + 0.0 * x.phase,)) for name, rate in fields.items()
+        ],
+        transitions=[
+            Transition("both", "ticked", Every(1.0), name="tick"),
+            Transition("both", "crossed", edge, back, name="cross"),
+            Transition("ticked", "both", edge, back, name="late cross"),
+            Transition("crossed", "both", Every(1.0), name="late tick"),
+        ],
+        start="both",
+        period=1.0,
+    )
+    for ulps in range(-8, 9):
+        phase = begin % 1.0 + ulps * np.spacing(0.5)
+        arc = hybrid.simulate(system, (phase,), (begin, begin + 6.0), solver=solver, tangent=tangent)
+        names = list(arc.jumps.transition)
+        ticks = sum(name.endswith("tick") for name in names)
+        assert (ticks, len(names) - ticks) == (6, 6)
