@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import attrs
 import numpy as np
 
@@ -10,6 +12,7 @@ from hybrid.display.progress import Progress, progress_bar
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
 from hybrid.orbits.continuation.crossing import crossing, flip_coefficient, fold_coefficient, is_supercritical
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import Place, moment, place_on, share_of
 from hybrid.orbits.continuation.result import Points, mode_at, whole_orbit_of
 from hybrid.orbits.continuation.walk import Event, walk
@@ -171,9 +174,31 @@ def branch_of(items: list[Item], points: Points) -> Branch:
             if isinstance(item, Event)
         ),
         status=SUCCESS,
-        orbit=lambda i: whole_orbit_of(passes[i], points),
+        orbit=_OrbitOf(passes, points),
     )
     return _unaged(branch)
+
+
+# Functions that remember are classes here: a branch is pickled with them.
+@attrs.frozen(eq=False)
+class _OrbitOf:
+    """The orbit of a point of a branch."""
+
+    passes: list[Pass]
+    points: Points
+
+    def __call__(self, i: int) -> PeriodicOrbit:
+        return whole_orbit_of(self.passes[i], self.points)
+
+
+@attrs.frozen(eq=False)
+class _WithoutAge:
+    """The orbit of a point of a branch, without the age."""
+
+    orbit: Callable[[int], PeriodicOrbit]
+
+    def __call__(self, i: int) -> PeriodicOrbit:
+        return unaged([self.orbit(i)])[0]
 
 
 def _unaged(branch: Branch) -> Branch:
@@ -188,7 +213,7 @@ def _unaged(branch: Branch) -> Branch:
         x0=np.delete(branch.x0, age, axis=1),
         multipliers=branch.multipliers[:, :-1],
         bifurcations=tuple(_without_component(each, age) for each in branch.bifurcations),
-        orbit=lambda i: unaged([branch.orbit(i)])[0],
+        orbit=_WithoutAge(branch.orbit),
     )
 
 
