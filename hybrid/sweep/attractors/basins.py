@@ -85,7 +85,7 @@ def basins(
         the mode that the call or the system names: it lies beyond a guard of each. The attribute
         ``violated_modes`` names these. ``steps`` is the number of points until the decision. With the
         attractors over the axis ``attractor``, as ``Attractors.to_xarray`` gives them, and their share of the
-        grid, ``fraction``.
+        grid, ``fraction``; after Ctrl-C, of the lines that are complete.
 
     Raises
     ------
@@ -215,7 +215,8 @@ def _dataset(setup: Setup, grid: Grid, search: Search, rows: np.ndarray, status:
     made["label"] = (dims, label.reshape(shape), {f"meaning of {key}": text for key, text in told.items()})
     made["steps"] = (dims, rows[:, POINTS].reshape(shape))
     made["status"] = (dims, code.reshape(shape).astype(np.int16), flags())
-    shares = [float(np.mean(label == i)) for i in range(1, len(found) + 1)]
+    run = rows[:, CODE] != StatusCode.NOT_RUN
+    shares = [float(np.sum(label == i)) / max(1, int(run.sum())) for i in range(1, len(found) + 1)]
     made["fraction"] = ("attractor", np.array(shares))
     for axis in grid.axes:
         made = made.assign_coords(
