@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import attrs
 import numpy as np
 
+from hybrid.display.tables import counted
 from hybrid.kernels.types import codes
 from hybrid.kernels.types.notes import MOST_LATENESS, is_plain
 from hybrid.simulation.trajectory import Trajectory
@@ -58,7 +59,7 @@ def _carries_plainly(trajectory: Trajectory) -> bool:
 
 def _notes(trajectory: Trajectory, code: int) -> list[str]:
     """What is told besides the status, with or without tangent vectors; ``is_plain`` names the reasons."""
-    notes = [*_start_beyond(trajectory), *_miscounted(trajectory), *_held(trajectory)]
+    notes = [*_start_beyond(trajectory), *_turned(trajectory), *_miscounted(trajectory), *_held(trajectory)]
     notes += _run_dry(trajectory, code)
     return [*notes, *_unproved(trajectory), *_unresolved(trajectory), *_unbounded(trajectory)]
 
@@ -82,6 +83,20 @@ def _start_beyond(trajectory: Trajectory) -> Iterator[str]:
             f"The start lies beyond the guard of {names}. This guard counts as crossed, so only its next "
             "crossing fires. For an event before the mode is entered, give the mode before a transition with "
             "the same guard."
+        )
+
+
+def _turned(trajectory: Trajectory) -> Iterator[str]:
+    """A note on ticks at which two transitions fired whose conditions exclude each other."""
+    run, system = trajectory.run, trajectory.system
+    if run.turned and not system.listed_order:
+        ticks, name = counted(run.turned, "tick"), system.transition_names[run.turned_to]
+        yield (
+            f"At {ticks} two transitions of one clock fired whose conditions (when=) exclude each other: the "
+            f"reset of the first one made the condition of {name!r} true. A "
+            "condition is evaluated at the state after the resets before it. If one transition per tick is "
+            "meant, write a single one whose reset chooses, with np.where. If both are meant, declare "
+            "HybridSystem(listed_order=True)."
         )
 
 

@@ -250,6 +250,8 @@ COUNTERS = (
     "field_jumps",
     "jumped_in",
     "entry_cycle",
+    "turned",
+    "turned_to",
 )
 NUMBERS = (
     "phase",
@@ -300,6 +302,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
       of the first tick of a clock that has not fired anything yet. ``ticks`` are the numbers of all
       clocks, those of a transition from ``model.first_tick`` on: period and offset, or times, or a duration.
       The mode was entered in the period ``entry_cycle`` at ``entry_phase``, and ``entry_low`` of rounding.
+    - ``turned``: jumps at ticks that changed which transition of their clock may fire, last to ``turned_to``.
     - ``horizon``: how long the run takes, as far as it is known at its start; 0 if it is not.
     - ``longest_step``: the longest step in time so far; ``lateness``: the largest change that the rounding of
       the time made in a step or jump, in tolerances.
