@@ -48,6 +48,7 @@ class StatusCode(IntEnum):
     INFINITE_SLOPE = 107
     ROUNDED_TIME = 108
     OUT_OF_MEMORY = 109
+    START_BEYOND = 110
 
 
 @attrs.frozen
@@ -192,6 +193,19 @@ def stuck_status(where: str, transitions: Sequence[Transition], facing: bool) ->
         f"{message} Each jump takes the state beyond the guard of the next.",
         "Change the resets so that one of them leaves the state before the next guard, or give a guard a "
         "condition (when=).",
+    )
+
+
+def beyond_status(names: Sequence[str]) -> Status:
+    """Status of a complete run whose start lies beyond guards that have not fired in it."""
+    guards = (
+        f"the guard of {names[0]!r}" if len(names) == 1 else f"the guards of {', '.join(map(repr, names))}"
+    )
+    return Status(
+        StatusCode.START_BEYOND,
+        f"Reached the end, but the start lies beyond {guards}: a guard counts as crossed there, and none of "
+        "these has fired. A run from the near side would have left this motion.",
+        "Start before the guard, or in the mode behind the guard. Without mode= the guards choose the mode.",
     )
 
 

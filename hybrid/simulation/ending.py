@@ -15,6 +15,7 @@ from hybrid.status import (
     SUCCESS,
     Status,
     StatusCode,
+    beyond_status,
     chatter_status,
     discontinuous_status,
     late_status,
@@ -45,6 +46,8 @@ def status_of(trajectory: Trajectory, code: int) -> Status:
         return SUCCESS
     status = _status(trajectory, code)
     notes = _notes(trajectory, code)
+    if status.code != StatusCode.START_BEYOND:
+        notes = [*_start_beyond(trajectory), *notes]
     if status.code != StatusCode.DISCONTINUOUS_FIELD:
         notes += _kinks(trajectory)
     return attrs.evolve(status, message=" ".join([status.message, *notes])) if notes else status
@@ -59,7 +62,7 @@ def _carries_plainly(trajectory: Trajectory) -> bool:
 
 def _notes(trajectory: Trajectory, code: int) -> list[str]:
     """What is told besides the status, with or without tangent vectors; ``is_plain`` names the reasons."""
-    notes = [*_start_beyond(trajectory), *_turned(trajectory), *_miscounted(trajectory), *_held(trajectory)]
+    notes = [*_turned(trajectory), *_miscounted(trajectory), *_held(trajectory)]
     notes += _run_dry(trajectory, code)
     return [*notes, *_unproved(trajectory), *_unresolved(trajectory), *_unbounded(trajectory)]
 
@@ -73,6 +76,14 @@ def _grow(trajectory: Trajectory, code: int) -> None:
     if growth.leads_on(name):
         growth.extend(name)
         raise Unexplored(name)
+
+
+def _never_fired(trajectory: Trajectory) -> list[str]:
+    """The transitions whose guards the start lies beyond, and that have not fired since, by their names."""
+    system, fires = trajectory.system, trajectory.run.fires
+    parts = {each.name: each.part_of or each.name for each in system.transitions}
+    names = dict.fromkeys(parts[name] for name in trajectory.beyond)
+    return [name for name in names if not fires[system.copies_of(name)].any()]
 
 
 def _start_beyond(trajectory: Trajectory) -> Iterator[str]:
@@ -257,6 +268,8 @@ def _status(trajectory: Trajectory, code: int) -> Status:
             "the first are not known.",
             "Shorten the steps by max_step= of the solver, or ask for fewer exponents.",
         )
+    if code == codes.DONE and trajectory.beyond and (names := _never_fired(trajectory)):
+        return beyond_status(names)
     if code == codes.DONE and run.unknown_time:
         return Status(StatusCode.INFINITE_SLOPE, f"Reached the end. {_uncertain(trajectory)}", LOWER)
     if code == codes.DONE and run.lateness > MOST_LATENESS:

@@ -12,7 +12,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from hybrid.simulation.interrupt import CTRL_C, stopped_by
+from hybrid.compiler.interrupts import CTRL_C, stopped_by
 from hybrid.sweep.job import Job, Rhythm, carried
 from hybrid.sweep.outcome import Batch, Outcome, Part, attempt
 

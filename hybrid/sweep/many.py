@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike
 from hybrid import arguments
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.compiled import compile_system
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import progress_bar
 from hybrid.errors import ArgumentError, HybridError
 from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
-from hybrid.simulation.interrupt import CTRL_C, Bursts
+from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.memory import starts_of
 from hybrid.simulation.periods import check_time, split_time

@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
@@ -18,7 +19,7 @@ from hybrid.orbits.continuation.result import Points, mode_at, whole_orbit_of
 from hybrid.orbits.continuation.walk import Event, walk
 from hybrid.orbits.orbit import PeriodicOrbit, unaged
 from hybrid.orbits.sensitivity import is_isolated
-from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import Solver, Taylor
 from hybrid.status import SUCCESS, Status, StatusCode

@@ -10,9 +10,10 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
-from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode

@@ -8,10 +8,10 @@ from typing import Any
 import attrs
 import numpy as np
 
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import Progress
 from hybrid.kernels.types import attractors as kernel_types
 from hybrid.kernels.types import codes
-from hybrid.simulation.interrupt import CTRL_C
 from hybrid.status import StatusCode
 from hybrid.sweep.attractors.attractor import KINDS, Attractor
 from hybrid.sweep.attractors.find import MOST_POINTS, Found, extended, find

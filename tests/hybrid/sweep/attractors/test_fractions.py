@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.simulation.interrupt import CtrlC
+from hybrid.compiler.interrupts import CtrlC
 from tests.hybrid.sweep.attractors.test_attractors import double_well
 
 FOLD = 2 / (3 * np.sqrt(3))
