@@ -55,9 +55,9 @@ class StatusCode(IntEnum):
 class Status:
     """Code, message and remedy of a result.
 
-    ``status.ok`` is true for ``SUCCESS`` alone: the result is complete and valid. It is false for
-    ``TERMINAL``, also where the model plans this end. If a run ended early, the result holds everything that
-    was computed before.
+    ``status.ok`` is true for ``SUCCESS``, and for ``START_BEYOND``, where the start is unlikely: the result
+    is complete and valid. It is false for ``TERMINAL``, also where the model plans this end. If a run ended
+    early, the result holds everything that was computed before.
 
     Examples
     --------
@@ -76,7 +76,7 @@ class Status:
     @property
     def ok(self) -> bool:
         """Whether the result is complete and valid."""
-        return self.code == StatusCode.SUCCESS
+        return self.code in (StatusCode.SUCCESS, StatusCode.START_BEYOND)
 
     @property
     def brief(self) -> str:
@@ -198,13 +198,12 @@ def stuck_status(where: str, transitions: Sequence[Transition], facing: bool) ->
 
 def beyond_status(names: Sequence[str]) -> Status:
     """Status of a complete run whose start lies beyond guards that have not fired in it."""
-    guards = (
-        f"the guard of {names[0]!r}" if len(names) == 1 else f"the guards of {', '.join(map(repr, names))}"
-    )
+    one, listed = len(names) == 1, ", ".join(map(repr, names))
+    guards, counts, fires = ("guard", "which counts", "fires") if one else ("guards", "which count", "fire")
     return Status(
         StatusCode.START_BEYOND,
-        f"Reached the end, but the start lies beyond {guards}: a guard counts as crossed there, and none of "
-        "these has fired. A run from the near side would have left this motion.",
+        f"{PLAIN} The start lies beyond the {guards} of {listed}, {counts} as crossed there and never "
+        f"{fires}. A run from the near side would have left this motion.",
         "Start before the guard, or in the mode behind the guard. Without mode= the guards choose the mode.",
     )
 

@@ -36,14 +36,24 @@ _OF_THREAD = threading.local()
 
 
 @contextmanager
-def stopped_by(stop: threading.Event) -> Iterator[None]:
-    """Let the runs in this thread end early when ``stop`` is set, as if Ctrl-C had been pressed there."""
-    before = getattr(_OF_THREAD, "stop", None)
-    _OF_THREAD.stop = stop
+def stopped_by(stop: threading.Event, *, dropped: bool = False) -> Iterator[None]:
+    """Let the runs in this thread end early when ``stop`` is set, as if Ctrl-C had been pressed there.
+
+    If what the thread is at is ``dropped`` then, no new run begins and nothing is compiled: both raise
+    KeyboardInterrupt.
+    """
+    before = getattr(_OF_THREAD, "stop", None), getattr(_OF_THREAD, "dropped", False)
+    _OF_THREAD.stop, _OF_THREAD.dropped = stop, dropped
     try:
         yield
     finally:
-        _OF_THREAD.stop = before
+        _OF_THREAD.stop, _OF_THREAD.dropped = before
+
+
+def raise_if_dropped() -> None:
+    """Raise KeyboardInterrupt in a thread whose work is no longer wanted."""
+    if getattr(_OF_THREAD, "dropped", False) and _OF_THREAD.stop.is_set():
+        raise KeyboardInterrupt
 
 
 class CtrlC:
@@ -58,6 +68,7 @@ class CtrlC:
     def __init__(self) -> None:
         self.depth = self.compiling = 0
         self.heard = self.noticed = False
+        self.watch: threading.Timer | None = None
 
     def is_set(self) -> bool:
         """Whether Ctrl-C was pressed since the outermost ``with`` began."""
@@ -69,8 +80,18 @@ class CtrlC:
 
     def raise_if_set(self) -> None:
         """Raise KeyboardInterrupt if Ctrl-C was pressed: where there is no result yet that could be kept."""
-        if self.is_set():
+        if _in_main_thread() and self.is_set():
             raise KeyboardInterrupt
+        raise_if_dropped()
+
+    @contextmanager
+    def ending(self) -> Iterator[None]:
+        """End the block where Ctrl-C is raised in it: what the block has found so far is kept."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            if not self.is_set():
+                raise
 
     def __enter__(self) -> None:
         if _in_main_thread():
@@ -86,6 +107,9 @@ class CtrlC:
             return
         if signal.getsignal(signal.SIGINT) == self._hear:
             signal.signal(signal.SIGINT, signal.default_int_handler)
+        if self.watch is not None:
+            self.watch.cancel()
+            self.watch = None
         lost = self.heard and not self.noticed and failure[0] is None
         self.heard = self.noticed = False
         if lost:
@@ -94,9 +118,9 @@ class CtrlC:
     def _hear(self, number: int, frame: object) -> None:
         if not self.heard:
             self.heard = True
-            watch = threading.Timer(PATIENCE, self._insist)
-            watch.daemon = True
-            watch.start()
+            self.watch = threading.Timer(PATIENCE, self._insist)
+            self.watch.daemon = True
+            self.watch.start()
         elif not self.compiling:
             raise KeyboardInterrupt
 

@@ -290,15 +290,16 @@ def _both_ways(
     why: list[str] = []
     for sign in (-1.0, 1.0):
         items = items[::-1]
-        for item in along_curve(curve, attrs.evolve(begin, way=sign * begin.way), lows, highs, most):
-            if isinstance(item, str):
-                why.append(item)
-                break
-            items.append(item)
-            bar.update(isinstance(item, Spot))
-            if CTRL_C.is_set():
-                return items, why
-        if why[-1] == "closed":
+        with CTRL_C.ending():
+            for item in along_curve(curve, attrs.evolve(begin, way=sign * begin.way), lows, highs, most):
+                if isinstance(item, str):
+                    why.append(item)
+                    break
+                items.append(item)
+                bar.update(isinstance(item, Spot))
+                if CTRL_C.is_set():
+                    break
+        if CTRL_C.is_set() or why[-1] == "closed":
             break
     return items, why
 

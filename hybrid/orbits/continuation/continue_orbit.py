@@ -143,13 +143,14 @@ def _branch(
 
 def _walked(begin: Place, low: float, high: float, most: int, items: list[Item], bar: Progress) -> str:
     """Walk from a place; what is met goes to the items. Returns why the walk ends."""
-    for item in walk(begin, low, high, most):
-        if isinstance(item, str):
-            return item
-        items.append(item)
-        bar.update(isinstance(item, Place))
-        if CTRL_C.is_set():
-            break
+    with CTRL_C.ending():
+        for item in walk(begin, low, high, most):
+            if isinstance(item, str):
+                return item
+            items.append(item)
+            bar.update(isinstance(item, Place))
+            if CTRL_C.is_set():
+                break
     return "interrupted"
 
 

@@ -102,6 +102,9 @@ def basins(
     >>> found.label.values.tolist()
     [[1, 1], [1, 1], [1, 1], [1, 1], [1, 1], [-1, -1]]
     """
+    # Before the runs, so that their results come at once after Ctrl-C.
+    import xarray  # noqa: F401
+
     axes = axes_of(system, over, RESERVED)
     shown = as_flag(progress)
     grid = grid_of(system, axes)

@@ -107,6 +107,9 @@ def basin_fractions(
     >>> float(shares.fraction.sel(label=1))
     1.0
     """
+    # Before the runs, so that their results come at once after Ctrl-C.
+    import xarray  # noqa: F401
+
     axes = axes_of(system, over)
     count = arguments.count("starts", starts, 1)
     origins = with_age(system, sample_of(system, axes, count, arguments.count("seed", seed, 0)))
@@ -157,7 +160,7 @@ def _along(
     system.parameter_values(parameters)
     if name in named("parameters", parameters):
         raise ArgumentError(f"along: Parameter {name!r} is given twice: in along and in parameters.")
-    values = arguments.numbers(f"along[{name!r}]", getattr(value, "values", value), "be values in order")
+    values = arguments.numbers(f"along[{name!r}]", value, "be values in order")
     if values.ndim != 1 or not values.size or not np.isfinite(values).all():
         raise arguments.refusal(f"along[{name!r}]", "be finite values of shape (N,)", value)
     return name, values

@@ -66,7 +66,7 @@ def test_a_guard_beyond_which_a_run_starts_and_that_never_fires_is_a_status():
     arc = simulate(relay(), (1.5,), (0.0, 5.0), mode="on")
     assert arc.x[-1, 0] == pytest.approx(2.0 - 0.5 * np.exp(-5.0))
     assert arc.status.code == StatusCode.START_BEYOND
-    assert "the start lies beyond the guard of 'switch off'" in arc.status.message
+    assert "The start lies beyond the guard of 'switch off'" in arc.status.message
 
 
 @pytest.mark.parametrize(("start", "mode"), [(0.5, "on"), (0.5, "off"), (1.5, None), (1.5, "off")])
