@@ -100,6 +100,12 @@ def noting(status: Status, *sentences: str) -> Status:
 NAME_THE_LIMIT = (
     "Add a mode for the limit (rest, stick, slide) and name it: Transition(..., accumulates_to=...)."
 )
+# Of equations that have been split: nobody has written a transition that could name a mode.
+REST_OF_EQUATIONS = (
+    "These transitions come from switches in the equations, such as np.sign, and no mode is derived in which "
+    "the state rests where the surfaces of the switches meet. To go on from there, write the model as a "
+    "HybridSystem with a mode for the rest."
+)
 DECLARE_PERIOD = (
     "If the forcing is periodic, declare the period with HybridSystem(period=...): the phase of the forcing "
     "then keeps all its digits."
@@ -107,11 +113,13 @@ DECLARE_PERIOD = (
 SUCCESS = Status(StatusCode.SUCCESS, PLAIN)
 
 
-def run_status(code: int, where: str, transition: str | None, *, bare_time: bool) -> Status:
+def run_status(
+    code: int, where: str, transition: str | None, *, bare_time: bool, derived: bool = False
+) -> Status:
     """Status for the code with which the kernel ended a run.
 
-    ``transition`` names the last transition, if any. ``bare_time`` says that the mode depends on time and no
-    forcing period is declared.
+    ``transition`` names the last transition, if any, and ``derived`` says that it comes from a switch in the
+    equations. ``bare_time`` says that the mode depends on time and no forcing period is declared.
     """
     if code == StatusCode.SUCCESS:
         return SUCCESS
@@ -142,7 +150,7 @@ def run_status(code: int, where: str, transition: str | None, *, bare_time: bool
         StatusCode.ACCUMULATION: (
             f"After {last} the state rests on its guard {where} and the field pushes it through the guard: "
             "jumps with no time between them accumulate.",
-            NAME_THE_LIMIT,
+            REST_OF_EQUATIONS if derived else NAME_THE_LIMIT,
         ),
         StatusCode.INTERRUPTED: (
             f"Interrupted {where}.",
@@ -163,15 +171,18 @@ def run_status(code: int, where: str, transition: str | None, *, bare_time: bool
     return Status(kind, *texts[kind])
 
 
-def chatter_status(where: str, names: Sequence[str]) -> Status:
-    """Status of a run that ended at the limit of chatter; the named transitions fire in turn."""
+def chatter_status(where: str, names: Sequence[str], *, derived: bool) -> Status:
+    """Status of a run that ended at the limit of chatter; the named transitions fire in turn.
+
+    ``derived`` says that all of them come from switches in the equations.
+    """
     told = f"transition {names[0]!r}" if len(names) == 1 else "transitions " + ", ".join(map(repr, names))
     in_turn = "" if len(names) == 1 else " in turn"
     return Status(
         StatusCode.ACCUMULATION,
         f"Jumps of {told}{in_turn} accumulate {where}: the times between jumps become ever shorter, "
         "so infinitely many jumps take a finite time.",
-        NAME_THE_LIMIT,
+        REST_OF_EQUATIONS if derived else NAME_THE_LIMIT,
     )
 
 

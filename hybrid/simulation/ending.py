@@ -295,14 +295,24 @@ def _status(trajectory: Trajectory, code: int) -> Status:
         transitions = [trajectory.system.transitions[i] for i in fired]
         return stuck_status(where, transitions, _faces(trajectory, fired))
     if code == codes.ACCUMULATION and not run.at_rest:
-        return chatter_status(where, [names[i] for i in _recent(trajectory, run.round)])
+        fired = _recent(trajectory, run.round)
+        derived = all(_is_derived(trajectory, i) for i in fired)
+        return chatter_status(where, [names[i] for i in fired], derived=derived)
     last = run.last_fired
     if code in (codes.STEP_TOO_SMALL, codes.NON_FINITE):
         failed = _failed(trajectory, code)
         if failed is not None:
             return failed
     bare_time = trajectory.model.period == 0.0 and trajectory.model.timed.item(run.mode) == 1
-    return run_status(code, where, names[last] if last >= 0 else None, bare_time=bare_time)
+    name, derived = (names[last], _is_derived(trajectory, last)) if last >= 0 else (None, False)
+    return run_status(code, where, name, bare_time=bare_time, derived=derived)
+
+
+def _is_derived(trajectory: Trajectory, transition: int) -> bool:
+    """Whether a transition comes from a switch in the equations: between parts of one mode of the user's."""
+    system = trajectory.system
+    each = system.transitions[transition]
+    return each.part_of is None and system.modes[system.mode_index(each.source)].part_of is not None
 
 
 def _failed(trajectory: Trajectory, code: int) -> Status | None:

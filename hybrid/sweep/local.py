@@ -56,6 +56,8 @@ class _Run:
         self.job, self.keep, self.stored = job, keep, stored
         self.stop = threading.Event()
         self.lock, self.is_over = threading.Lock(), False
+        # What the workers have computed and not passed on yet.
+        self.batches: list[Batch] = []
         # Numbers of points that were kept, an error, or None from a worker that has ended.
         # A SimpleQueue waits without end if its time is over when it has heard a signal.
         self.reports: Queue[int | BaseException | None] = Queue()
@@ -87,6 +89,9 @@ class _Run:
                 self._halt()
                 with self.lock:
                     self.is_over = True
+                    # Those of workers that have been given up.
+                    for part in (part for batch in self.batches for part in batch.taken()):
+                        self.keep(part)
             if failure is not None:
                 raise failure
             return not CTRL_C.is_set()
@@ -99,6 +104,7 @@ class _Run:
     def _work(self) -> None:
         """Compute points until there are none, or until the sweep stops."""
         batch, rhythm = Batch(), Rhythm(self.stored)
+        self.batches.append(batch)
         try:
             try:
                 with stopped_by(self.stop, dropped=True):
@@ -106,7 +112,9 @@ class _Run:
                         # A point that was computed while the sweep stopped may be incomplete.
                         if self.stop.is_set():
                             break
-                        batch.add(row, outcome)
+                        with self.lock:
+                            if not self.is_over:
+                                batch.add(row, outcome)
                         if rhythm.is_due():
                             self._pass_on(batch)
             except KeyboardInterrupt:
@@ -122,11 +130,8 @@ class _Run:
             self.reports.put(None)
 
     def _pass_on(self, batch: Batch) -> None:
-        count = batch.count
         with self.lock:
-            # The results have been handed out: they do not change any more.
-            if self.is_over:
-                return
+            count = batch.count
             for part in batch.taken():
                 self.keep(part)
         self.reports.put(count)

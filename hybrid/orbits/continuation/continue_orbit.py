@@ -30,6 +30,8 @@ Item = Place | Event
 
 # A multiplier is -1 if it is this near.
 AT_MINUS_ONE = 1e-3
+# And 1 if it is this near: that of a family is the double root of an equation.
+NEAR_ONE = 1e-3
 
 ENDS = {
     "range": "the end of the range",
@@ -41,8 +43,8 @@ ENDS = {
 }
 
 MANY = (
-    "There are other orbits beside each: the one that is nearest to the orbit before is taken, and no "
-    "conserved quantity is held."
+    "A multiplier is 1, so there are other orbits beside each: the one that is nearest to the orbit before "
+    "is taken, and no conserved quantity is held."
 )
 
 
@@ -138,7 +140,16 @@ def _branch(
         why.append(_walked(attrs.evolve(begin, tangents=sign * begin.tangents), low, high, most, items, bar))
         if why[-1] in ("closed", "interrupted"):
             break
-    return branch_of(items, points), why, is_isolated(begin)
+    return branch_of(items, points), why, not _is_one_of_many(begin)
+
+
+def _is_one_of_many(place: Place) -> bool:
+    """Whether there are other orbits beside one at the same parameters.
+
+    They have a multiplier that is 1. The equations may be nearly singular without one: their sizes differ.
+    """
+    ones = np.abs(place.orbit.free_multipliers - 1.0) <= NEAR_ONE
+    return bool(np.any(ones)) and not is_isolated(place)
 
 
 def _walked(begin: Place, low: float, high: float, most: int, items: list[Item], bar: Progress) -> str:
