@@ -27,6 +27,7 @@ from hybrid.simulation.trajectory import Trajectory
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
 from hybrid.sweep.blocks import run_in_blocks
+from hybrid.sweep.extra import load_xarray
 from hybrid.sweep.local import cores
 from hybrid.sweep.outcome import text_of
 from hybrid.sweep.sheet import UNTOUCHED, flags
@@ -96,8 +97,7 @@ def simulate_many(
     [1, 1, 1]
     """
     as_system("system", system)
-    # Before the runs, so that their results come at once after Ctrl-C.
-    import xarray  # noqa: F401
+    load_xarray()
 
     t0, t1 = arguments.time_span("t_span", t_span)
     times = np.empty(0) if samples is None else arguments.increasing_times("samples", samples, t0, t1)

@@ -24,6 +24,7 @@ from hybrid.sweep.attractors.runs import CODE, NONE, OWNER, POINTS, runs_of
 from hybrid.sweep.attractors.search import FIRST_POINTS, Search, known_of
 from hybrid.sweep.attractors.setup import Setup, digest, setup_of
 from hybrid.sweep.attractors.starts import Grid, axes_of, grid_of
+from hybrid.sweep.extra import load_xarray
 from hybrid.sweep.local import cores
 from hybrid.sweep.sheet import flags
 from hybrid.sweep.sweep import sweep
@@ -102,8 +103,7 @@ def basins(
     >>> found.label.values.tolist()
     [[1, 1], [1, 1], [1, 1], [1, 1], [1, 1], [-1, -1]]
     """
-    # Before the runs, so that their results come at once after Ctrl-C.
-    import xarray  # noqa: F401
+    load_xarray()
 
     axes = axes_of(system, over, RESERVED)
     shown = as_flag(progress)

@@ -24,6 +24,7 @@ from hybrid.sweep.attractors.search import Search
 from hybrid.sweep.attractors.setup import Setup, digest, setup_of
 from hybrid.sweep.attractors.starts import axes_of, sample_of
 from hybrid.sweep.attractors.text import read, written
+from hybrid.sweep.extra import load_xarray
 from hybrid.sweep.sweep import sweep
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem
@@ -107,8 +108,7 @@ def basin_fractions(
     >>> float(shares.fraction.sel(label=1))
     1.0
     """
-    # Before the runs, so that their results come at once after Ctrl-C.
-    import xarray  # noqa: F401
+    load_xarray()
 
     axes = axes_of(system, over)
     count = arguments.count("starts", starts, 1)
