@@ -180,8 +180,8 @@ def _draw_map(
     ax.figure.colorbar(picture, ax=ax, label=label)
     if failed.any():
         rows, columns = np.nonzero(failed)
-        shown = {"color": FAILED_COLOUR, "markersize": 5, "clip_on": False}
-        ax.plot(x[columns], y[rows], "x", label=told(swept.status.values, WHERE), **shown)
+        said = told(swept.status.values, WHERE)
+        ax.plot(x[columns], y[rows], "x", color=FAILED_COLOUR, markersize=5, label=said, clip_on=False)
     ax.set_ylabel(_axis_label(swept, down))
 
 
