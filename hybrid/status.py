@@ -214,7 +214,7 @@ def beyond_status(names: Sequence[str]) -> Status:
     return Status(
         StatusCode.START_BEYOND,
         f"{PLAIN} The start lies beyond the {guards} of {listed}, {counts} as crossed there and never "
-        f"{fires}. A run from the near side would have left this motion.",
+        f"{fires} in this run. A run from the near side would have left this motion.",
         "Start before the guard, or in the mode behind the guard. Without mode= the guards choose the mode.",
     )
 
