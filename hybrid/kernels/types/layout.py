@@ -292,8 +292,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     - ``on_guard (transitions,)``: 1 if the guard vanishes at the last event or entry and has not been left
       since; 2 if its speed vanishes too, 3 if its acceleration does as well, 4 if it jumps across zero there.
     - ``due (transitions,)``: 1 if the guard has been crossed at this instant and has not fired yet.
-    - ``recent``: the last transitions that fired; jump ``j`` is at ``j`` modulo the length. ``fires`` counts
-      for each transition how often it has fired.
+    - ``recent``: the last to fire; jump ``j`` is at ``j`` modulo the length. ``fires``: how often each has.
     - ``visits (64, n + 2)``: the states right after those jumps, with their phases and cycles.
     - ``rehearsal (4, transitions)``: scratch for jumps that are only tried; in the last row, the sides of
       guards before the crossings found on the last step.
