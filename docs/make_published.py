@@ -188,7 +188,7 @@ def three_disks() -> list[Number]:
 
 def buck_converter() -> list[Number]:
     converter, given = models.buck_converter(), {"parameters": {"E": 20.0}}
-    run = simulate(converter, (12.0, 0.5, 0.0), (0.0, 0.08), mode="on", **given)
+    run = simulate(converter, (12.0, 0.5, 0.0), (0.0, 0.08), mode="off", **given)
     orbit = periodic_orbit(converter, run.x[-1], mode=str(run.mode[-1]), **given)
     (flip,) = continue_orbit(orbit, "E", (15.0, 30.0)).bifurcations
     voltage = float(exact.converter_flip((2e-4, 24.5)))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import sys
 from collections.abc import Callable, Iterable, Mapping, Set
 from math import inf, isfinite
 from numbers import Real
@@ -29,7 +30,34 @@ LARGEST_COUNT = int(np.iinfo(np.int64).max)
 
 def refusal(name: str, wanted: str, value: object) -> ArgumentError:
     """The error for a value that is not allowed; ``wanted`` says what is."""
-    return ArgumentError(f"{name} must {wanted}; got {shown(value)}.")
+    return ArgumentError(f"{name} must {wanted}; got {shown(value)}.{without_units(value)}")
+
+
+def has_units(value: object) -> bool:
+    """Whether a value, its data or an item of it carries units, as those of pint and astropy do.
+
+    NumPy would drop the units: 1000 mm would become 1000.
+    """
+    if _is_quantity(value):
+        return True
+    if isinstance(value, Mapping):
+        return any(map(_is_quantity, value.values()))
+    if isinstance(value, list | tuple):
+        return any(map(_is_quantity, value))
+    xarray = sys.modules.get("xarray")
+    return xarray is not None and isinstance(value, xarray.DataArray) and _is_quantity(value.data)
+
+
+def _is_quantity(value: object) -> bool:
+    kind = type(value)
+    return hasattr(kind, "to") and (hasattr(kind, "units") or hasattr(kind, "unit"))
+
+
+def without_units(value: object) -> str:
+    """What to do with a value that carries units; empty for others."""
+    if not has_units(value):
+        return ""
+    return " Give plain numbers in the units of the model, such as value.to('m').magnitude."
 
 
 def number(name: str, value: object) -> float:
@@ -263,7 +291,7 @@ def _as_float(value: object) -> float | None:
 def floats(value: object) -> np.ndarray | None:
     """Real numbers as a new array of floats; None if any item is not a real number."""
     if isinstance(value, np.ndarray):
-        if np.ma.is_masked(value):
+        if np.ma.is_masked(value) or (type(value) is not np.ndarray and has_units(value)):
             return None
         if value.dtype.kind in "fiu":
             return np.array(value, dtype=float)
@@ -274,7 +302,7 @@ def floats(value: object) -> np.ndarray | None:
             return np.array(value, dtype=float)
         except OverflowError:  # an integer beyond the largest float
             pass
-    if isinstance(value, bytes | bytearray):
+    if isinstance(value, bytes | bytearray) or has_units(value):
         return None
     try:
         given = np.array(value, dtype=object)

@@ -48,15 +48,16 @@ class StatusCode(IntEnum):
     INFINITE_SLOPE = 107
     ROUNDED_TIME = 108
     OUT_OF_MEMORY = 109
+    START_BEYOND = 110
 
 
 @attrs.frozen
 class Status:
     """Code, message and remedy of a result.
 
-    ``status.ok`` is true for ``SUCCESS`` alone: the result is complete and valid. It is false for
-    ``TERMINAL``, also where the model plans this end. If a run ended early, the result holds everything that
-    was computed before.
+    ``status.ok`` is true for ``SUCCESS``, and for ``START_BEYOND``, where the start is unlikely: the result
+    is complete and valid. It is false for ``TERMINAL``, also where the model plans this end. If a run ended
+    early, the result holds everything that was computed before.
 
     Examples
     --------
@@ -75,7 +76,7 @@ class Status:
     @property
     def ok(self) -> bool:
         """Whether the result is complete and valid."""
-        return self.code == StatusCode.SUCCESS
+        return self.code in (StatusCode.SUCCESS, StatusCode.START_BEYOND)
 
     @property
     def brief(self) -> str:
@@ -99,6 +100,12 @@ def noting(status: Status, *sentences: str) -> Status:
 NAME_THE_LIMIT = (
     "Add a mode for the limit (rest, stick, slide) and name it: Transition(..., accumulates_to=...)."
 )
+# Of equations that have been split: nobody has written a transition that could name a mode.
+REST_OF_EQUATIONS = (
+    "These transitions come from switches in the equations, such as np.sign, and no mode is derived in which "
+    "the state rests where the surfaces of the switches meet. To go on from there, write the model as a "
+    "HybridSystem with a mode for the rest."
+)
 DECLARE_PERIOD = (
     "If the forcing is periodic, declare the period with HybridSystem(period=...): the phase of the forcing "
     "then keeps all its digits."
@@ -106,11 +113,13 @@ DECLARE_PERIOD = (
 SUCCESS = Status(StatusCode.SUCCESS, PLAIN)
 
 
-def run_status(code: int, where: str, transition: str | None, *, bare_time: bool) -> Status:
+def run_status(
+    code: int, where: str, transition: str | None, *, bare_time: bool, derived: bool = False
+) -> Status:
     """Status for the code with which the kernel ended a run.
 
-    ``transition`` names the last transition, if any. ``bare_time`` says that the mode depends on time and no
-    forcing period is declared.
+    ``transition`` names the last transition, if any, and ``derived`` says that it comes from a switch in the
+    equations. ``bare_time`` says that the mode depends on time and no forcing period is declared.
     """
     if code == StatusCode.SUCCESS:
         return SUCCESS
@@ -141,7 +150,7 @@ def run_status(code: int, where: str, transition: str | None, *, bare_time: bool
         StatusCode.ACCUMULATION: (
             f"After {last} the state rests on its guard {where} and the field pushes it through the guard: "
             "jumps with no time between them accumulate.",
-            NAME_THE_LIMIT,
+            REST_OF_EQUATIONS if derived else NAME_THE_LIMIT,
         ),
         StatusCode.INTERRUPTED: (
             f"Interrupted {where}.",
@@ -162,15 +171,18 @@ def run_status(code: int, where: str, transition: str | None, *, bare_time: bool
     return Status(kind, *texts[kind])
 
 
-def chatter_status(where: str, names: Sequence[str]) -> Status:
-    """Status of a run that ended at the limit of chatter; the named transitions fire in turn."""
+def chatter_status(where: str, names: Sequence[str], *, derived: bool) -> Status:
+    """Status of a run that ended at the limit of chatter; the named transitions fire in turn.
+
+    ``derived`` says that all of them come from switches in the equations.
+    """
     told = f"transition {names[0]!r}" if len(names) == 1 else "transitions " + ", ".join(map(repr, names))
     in_turn = "" if len(names) == 1 else " in turn"
     return Status(
         StatusCode.ACCUMULATION,
         f"Jumps of {told}{in_turn} accumulate {where}: the times between jumps become ever shorter, "
         "so infinitely many jumps take a finite time.",
-        NAME_THE_LIMIT,
+        REST_OF_EQUATIONS if derived else NAME_THE_LIMIT,
     )
 
 
@@ -192,6 +204,18 @@ def stuck_status(where: str, transitions: Sequence[Transition], facing: bool) ->
         f"{message} Each jump takes the state beyond the guard of the next.",
         "Change the resets so that one of them leaves the state before the next guard, or give a guard a "
         "condition (when=).",
+    )
+
+
+def beyond_status(names: Sequence[str]) -> Status:
+    """Status of a complete run whose start lies beyond guards that have not fired in it."""
+    one, listed = len(names) == 1, ", ".join(map(repr, names))
+    guards, counts, fires = ("guard", "which counts", "fires") if one else ("guards", "which count", "fire")
+    return Status(
+        StatusCode.START_BEYOND,
+        f"{PLAIN} The start lies beyond the {guards} of {listed}, {counts} as crossed there and never "
+        f"{fires} in this run. A run from the near side would have left this motion.",
+        "Start before the guard, or in the mode behind the guard. Without mode= the guards choose the mode.",
     )
 
 

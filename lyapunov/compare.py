@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridSystem, Status, arguments, compile_system
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import progress_bar
 from hybrid.display.tables import table
-from hybrid.simulation.interrupt import CTRL_C
 from hybrid.solvers import Solver
 from hybrid.status import SUCCESS
 from hybrid.system.graph import as_system

@@ -8,7 +8,7 @@ import numpy as np
 
 from hybrid import ArgumentError, StatusCode, arguments
 from hybrid.display.tables import with_unit
-from hybrid.plot.style import axes_for, check_axes, small_legend
+from hybrid.plot.style import axes_for, check_axes, small_legend, told
 
 if TYPE_CHECKING:
     import xarray
@@ -142,7 +142,8 @@ def plot_map(
     picture = _drawn(chart, np.ma.masked_invalid(values), ax, shades)
     label = with_unit(f"$\\lambda_{{{exponent + 1}}}$", chart.exponents.attrs.get("units"))
     ax.figure.colorbar(picture, ax=ax, extend="both", label=label)
-    marked = [(failed, COLOURS_OF_KINDS[0], "failed, see chart.message"), (lost, LOST, "minus infinity")]
+    said = told(chart.status.values, "chart.message")
+    marked = [(failed, COLOURS_OF_KINDS[0], said), (lost, LOST, "minus infinity")]
     if lost.any():
         shade = {"cmap": ListedColormap([LOST]), "vmin": 0.0, "vmax": 1.0}
         _drawn(chart, np.ma.masked_array(np.ones(lost.shape), ~lost), ax, shade)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from hybrid import ArgumentError, HybridArc, StatusCode, arguments
 from hybrid.display.tables import with_unit
 from hybrid.plot import DATASETS, drawn
-from hybrid.plot.style import Rows, as_component, axes_for, dot_area, mark, small_legend
+from hybrid.plot.style import Rows, as_component, axes_for, dot_area, mark, small_legend, told
 from hybrid.simulation.labelled import Names
 from lyapunov.compare import ModelComparison
 from lyapunov.convergence import (
@@ -73,7 +73,7 @@ __all__ = [
 
 # Size of a mark of a failed row in points.
 MARK = 8.0
-FAILED = "failed, see chart.message"
+WHERE = "chart.message"
 POINTS_OF_A_PORTRAIT = 40_000
 
 
@@ -374,7 +374,7 @@ def _mark_failures(ax: Axes, chart: xarray.Dataset, values: np.ndarray, length: 
     """Ticks at the bottom of the axes for the rows whose status is not ok; whether there are any."""
     bad = values[chart.status.values != StatusCode.SUCCESS]
     if len(bad):
-        mark(ax, bad, "|", "#B2182B", FAILED, size=length)
+        mark(ax, bad, "|", "#B2182B", told(chart.status.values, WHERE), size=length)
     return len(bad) > 0
 
 

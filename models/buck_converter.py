@@ -46,7 +46,7 @@ def buck_converter() -> HybridSystem:
     >>> import models
     >>> from hybrid import periodic_orbit, simulate
     >>> low = {"E": 20.0}
-    >>> arc = simulate(models.buck_converter(), (12.0, 0.5, 0.0), (0.0, 0.08), mode="on", parameters=low)
+    >>> arc = simulate(models.buck_converter(), (12.0, 0.5, 0.0), (0.0, 0.08), mode="off", parameters=low)
     >>> orbit = periodic_orbit(models.buck_converter(), arc.x[-1], mode=str(arc.mode[-1]), parameters=low)
     >>> orbit.status.ok, orbit.signature
     (True, ('off', 'on', 'off'))

@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike
 
 from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.errors import ArgumentError
 from hybrid.simulation.arc import HybridArc
-from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.plan import check_solver
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver

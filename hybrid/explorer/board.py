@@ -160,6 +160,7 @@ class Board:
             self.calls["diagram"] = (diagram_call(self.subject, scene),)
         self.figures.diagram.add(scene.over, chart)
         self.progress = (outcome.part + 1) / len(outcome.job.parts)
+        # A column from beyond a guard reaches its end; what is said of it goes with the others.
         early = chart.status.values != StatusCode.SUCCESS
         failed = int(early.sum())
         before = 0 if outcome.part == 0 else self.results.get("failed columns", 0)
@@ -167,8 +168,10 @@ class Board:
         if before + failed:
             message = next((str(each) for each in chart.message.values[early] if str(each)), "")
             self.results["why"] = message or self.results.get("why", "")
+            beyond = bool((chart.status.values[early] == StatusCode.START_BEYOND).any())
+            what = "ended early or began beyond a guard" if beyond else "ended early"
             self.words["diagram"] = (
-                f"Diagram: {counted(before + failed, 'column')} ended early. {self.results['why']}"
+                f"Diagram: {counted(before + failed, 'column')} {what}. {self.results['why']}"
             )
 
 

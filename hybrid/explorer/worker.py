@@ -10,8 +10,8 @@ from typing import Any
 
 import attrs
 
+from hybrid.compiler.interrupts import stopped_by
 from hybrid.errors import HybridError
-from hybrid.simulation.interrupt import stopped_by
 
 # Seconds after which a part is told to end with what it has, and after which it gives way to a newer job for
 # the same picture. Before that it is shown, so that a picture moves while a slider does.

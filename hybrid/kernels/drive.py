@@ -11,6 +11,7 @@ from hybrid.kernels.events.clocks import (
     next_tick,
     pass_tick,
     ticking,
+    turned_to,
     wind,
 )
 from hybrid.kernels.events.guards import (
@@ -83,7 +84,10 @@ def fire(parts, task, stop_cycle, stop_phase, max_jumps):
     run.pending = NO_TRANSITION
     if model.timed_jump[fired] == 1 and run.since_entry > 0.0 and is_late(task.method, run):
         parts.late_jump(model, task.method, run, fired, task.work)
-    parts.jump(task, fired)
+    if model.clock[fired] != 0:
+        jump_at_tick(parts, task, fired)
+    else:
+        parts.jump(task, fired)
     begin_stretch(model, run, time_left(model, run, stop_cycle, stop_phase))
     if model.target[fired] == NO_MODE:
         return TERMINAL
@@ -96,6 +100,20 @@ def fire(parts, task, stop_cycle, stop_phase, max_jumps):
     if ended and model.accumulates_to[run.last_fired] == NO_MODE:
         return ACCUMULATION
     return GO_ON
+
+
+@njit(**KERNEL)
+def jump_at_tick(parts, task, fired):
+    """Make a jump at a tick, and count it if its reset gives the turn to another transition of the clock."""
+    model, run = task.model, task.run
+    # A new stretch begins with the jump, so the state before it may be kept here.
+    for i in range(model.dimension):
+        run.stretch[i] = run.y[i]
+    parts.jump(task, fired)
+    other = turned_to(model, run, fired, run.stretch, task.work.scalar)
+    if other != NO_TRANSITION:
+        run.turned += 1
+        run.turned_to = other
 
 
 @njit(**KERNEL)

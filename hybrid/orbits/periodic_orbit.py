@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike
 
 from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.errors import ArgumentError
 from hybrid.orbits.newton import Point
 from hybrid.orbits.orbit import PeriodicOrbit, unaged
 from hybrid.orbits.shooting import Shooting
-from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import DOP853, Solver
 from hybrid.system.clocks import Every, numbers_of

@@ -60,6 +60,16 @@ NEAR_ONE = 1e-3
 # The turn of an angle that is not declared.
 TURN = 2.0 * np.pi
 FAMILY = "The orbit is one of a family"
+# What helps a search that found no orbit.
+START_NEARER = "Start nearer to the orbit: simulate first if it is stable."
+MORE_ITERATIONS = (
+    "Start nearer to the orbit (simulate first if it is stable), or raise max_iterations; if states are "
+    "small, give a solver= with a lower atol."
+)
+NAME_THE_MODE = (
+    "Start in the mode that the orbit is in at this time: name it with mode=, or simulate first and start "
+    "from the end of that run, with its mode."
+)
 HOLD_IT = (
     "If the system conserves a quantity, declare it with HybridSystem(laws=Laws(conserved=...)): the search "
     "then holds the value that it has at the guess."
@@ -410,16 +420,12 @@ class Shooting:
         """How Newton's method ended: with an orbit, or why there is none."""
         if not shot.reached:
             return shot.status
-        reason = self._objection(shot, newton, iterations, tolerance)
-        if reason is None:
+        objection = self._objection(shot, newton, iterations, tolerance)
+        if objection is None:
             # With what the run along the orbit has to say of its crossings and its tangent vectors.
             return shot.status
-        return Status(
-            StatusCode.NOT_CONVERGED,
-            f"Newton's method did not converge: {reason}.",
-            "Start nearer to the orbit (simulate first if it is stable), or raise max_iterations; if states "
-            "are small, give a solver= with a lower atol.",
-        )
+        reason, remedy = objection
+        return Status(StatusCode.NOT_CONVERGED, f"Newton's method did not converge: {reason}.", remedy)
 
     def _explained(self, status: Status, shot: Shot, newton: Newton, multipliers: np.ndarray) -> Status:
         """The status of an orbit, with what is held, and whether the orbit is still one of many."""
@@ -444,8 +450,10 @@ class Shooting:
         finer = attrs.evolve(self, mode=shot.mode, solver=self.solver.tightened(TIGHTER**2)).shoot(moved)
         return finer.whole and newton.free_directions(shot, finer)
 
-    def _objection(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> str | None:
-        """Why the last shot is no periodic orbit, or None if it is one.
+    def _objection(
+        self, shot: Shot, newton: Newton, iterations: int, tolerance: float
+    ) -> tuple[str, str] | None:
+        """Why the last shot is no periodic orbit, and what helps; None if it is one.
 
         The ends agree; the orbit moves, if nothing but its motion has a period; and what is left of Newton's
         step is small. At infinity, or where a solution drifts, the ends may agree and that step is large. It
@@ -453,32 +461,36 @@ class Shooting:
         to have settled at it, and the solver's error alone may keep it from closing.
         """
         if shot.end_mode != shot.mode:
-            return f"the orbit ends in mode {shot.end_mode!r} and starts in {shot.mode!r}"
+            return f"the orbit ends in mode {shot.end_mode!r} and starts in {shot.mode!r}", NAME_THE_MODE
         if not shot.whole or not newton.measurable(shot):
-            return "the tangent vectors left the range of numbers"
+            return "the tangent vectors left the range of numbers", START_NEARER
         growth = shot.growth(newton.scale)
         if not growth * EPSILON < 1.0:
-            return (
+            told = (
                 f"errors of the start grow by a factor of {growth:.3g} over the period, so no digit is left"
             )
+            return told, START_NEARER
         largest = np.abs([newton.anchor, shot.point.x, shot.end]).max()
         if 0.0 < largest <= self.solver.atol:
-            return (
+            told = (
                 f"all states are below the atol of the solver, {self.solver.atol:.3g}, and so not controlled"
             )
+            return told, "Give a solver= with a lower atol, or write the model in other units."
         # A component that is throughout below the solver's absolute tolerance, or below what the rounding of
         # the others makes of it, counts as zero.
         zero = np.maximum(self.solver.atol, shot.rounding)
         nothing = np.where(shot.magnitude <= zero, zero, 0.0)
         if not shot.closes(tolerance, shot.rounding, nothing):
-            return f"the residual is {length(shot.gap):.3g} after {iterations} iterations"
+            return f"the residual is {length(shot.gap):.3g} after {iterations} iterations", MORE_ITERATIONS
         noise = np.maximum(ROUNDING_OF_GAP * EPSILON * shot.magnitude, nothing)
         if newton.free_period and not np.any(shot.extent > LEAST_MOTION * noise):
-            return f"it led to an equilibrium: the state moves by {shot.extent.max():.3g} in all"
+            told = f"it led to an equilibrium: the state moves by {shot.extent.max():.3g} in all"
+            return told, "Start farther from the equilibrium: simulate first if the orbit is stable."
         step, _ = newton.step(shot)
         enough = np.maximum(np.sqrt(tolerance) * shot.extent, POINT_ERROR * shot.magnitude)
         if newton.led_astray(shot, FARTHEST):
-            return "it went far along a direction in which the ends do not tell where an orbit is"
+            told = "it went far along a direction in which the ends do not tell where an orbit is"
+            return told, START_NEARER
         if np.all(np.abs(step) <= np.maximum(enough, nothing)):
             return None
         near = np.all((shot.extent <= FARTHEST * newton.first) & (np.abs(shot.gap) <= DRIFT * shot.extent))
@@ -486,7 +498,8 @@ class Shooting:
         settled = np.all(np.abs(newton.moved) <= np.maximum(SETTLED * sizes, noise))
         if near and settled and not self._drifts(shot, newton, tolerance):
             return None
-        return (
+        told = (
             f"the ends agree to {length(shot.gap):.3g}, but the next step would move the start by "
             f"{length(step):.3g}: the solution drifts, or no orbit is near"
         )
+        return told, START_NEARER

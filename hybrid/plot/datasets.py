@@ -10,14 +10,14 @@ from hybrid import arguments
 from hybrid.display.tables import with_unit
 from hybrid.errors import ArgumentError
 from hybrid.plot.orbits import second
-from hybrid.plot.style import COLOURS, Rows, as_component, axes_for, dot_area, mark, plain, small_legend
+from hybrid.plot.style import COLOURS, Rows, as_component, axes_for, dot_area, mark, plain, small_legend, told
 from hybrid.status import StatusCode
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-FAILED = "failed, see .message"
+WHERE = ".message"
 FAILED_COLOUR = "#B2182B"
 
 
@@ -81,7 +81,8 @@ def plot_ends(
         colour = COLOURS[index % len(COLOURS)]
         ax.scatter(across[there], up[there], s=area, color=colour, linewidths=0, label=mode, rasterized=True)
     if not good.all():
-        ax.scatter(across[~good], up[~good], s=25.0, color=FAILED_COLOUR, marker="x", label=FAILED)
+        label = told(ends.status.values, WHERE)
+        ax.scatter(across[~good], up[~good], s=25.0, color=FAILED_COLOUR, marker="x", label=label)
     ax.set_xlabel(f"start of {labels[i]}" if j is None else labels[i])
     ax.set_ylabel(labels[i if j is None else j])
     plain(ax)
@@ -166,7 +167,7 @@ def _draw_line(ax: Axes, swept: xarray.Dataset, dim: str, name: str, failed: np.
     order = np.argsort(at)
     ax.plot(at[order], values[order], "o-", color=COLOURS[0], linewidth=0.9, markersize=np.sqrt(area))
     if failed.any():
-        mark(ax, at[failed], "|", FAILED_COLOUR, FAILED)
+        mark(ax, at[failed], "|", FAILED_COLOUR, told(swept.status.values, WHERE))
 
 
 def _draw_map(
@@ -179,7 +180,8 @@ def _draw_map(
     ax.figure.colorbar(picture, ax=ax, label=label)
     if failed.any():
         rows, columns = np.nonzero(failed)
-        ax.plot(x[columns], y[rows], "x", color=FAILED_COLOUR, markersize=5, label=FAILED, clip_on=False)
+        said = told(swept.status.values, WHERE)
+        ax.plot(x[columns], y[rows], "x", color=FAILED_COLOUR, markersize=5, label=said, clip_on=False)
     ax.set_ylabel(_axis_label(swept, down))
 
 

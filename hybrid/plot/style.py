@@ -9,6 +9,7 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.errors import ArgumentError
+from hybrid.status import StatusCode
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -159,6 +160,12 @@ def small_legend(ax: Axes, handles: list[Any] | None = None) -> None:
         borderaxespad=0.2,
         fontsize=8,
     )
+
+
+def told(codes: Any, where: str) -> str:
+    """What a legend says of points whose status is not ok: names of the codes, and where to read more."""
+    names = sorted({StatusCode(int(code)).name for code in np.ravel(codes)} - {StatusCode.SUCCESS.name})
+    return f"{', '.join(names)}, see {where}"
 
 
 def mark(ax: Axes, at: Any, marker: str, colour: str, label: str, *, size: float = 7.0) -> None:

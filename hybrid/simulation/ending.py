@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import attrs
 import numpy as np
 
+from hybrid.display.tables import counted
 from hybrid.kernels.types import codes
 from hybrid.kernels.types.notes import MOST_LATENESS, is_plain
 from hybrid.simulation.trajectory import Trajectory
@@ -14,6 +15,7 @@ from hybrid.status import (
     SUCCESS,
     Status,
     StatusCode,
+    beyond_status,
     chatter_status,
     discontinuous_status,
     late_status,
@@ -44,6 +46,8 @@ def status_of(trajectory: Trajectory, code: int) -> Status:
         return SUCCESS
     status = _status(trajectory, code)
     notes = _notes(trajectory, code)
+    if status.code != StatusCode.START_BEYOND:
+        notes = [*_start_beyond(trajectory), *notes]
     if status.code != StatusCode.DISCONTINUOUS_FIELD:
         notes += _kinks(trajectory)
     return attrs.evolve(status, message=" ".join([status.message, *notes])) if notes else status
@@ -58,7 +62,7 @@ def _carries_plainly(trajectory: Trajectory) -> bool:
 
 def _notes(trajectory: Trajectory, code: int) -> list[str]:
     """What is told besides the status, with or without tangent vectors; ``is_plain`` names the reasons."""
-    notes = [*_start_beyond(trajectory), *_miscounted(trajectory), *_held(trajectory)]
+    notes = [*_turned(trajectory), *_miscounted(trajectory), *_held(trajectory)]
     notes += _run_dry(trajectory, code)
     return [*notes, *_unproved(trajectory), *_unresolved(trajectory), *_unbounded(trajectory)]
 
@@ -74,6 +78,14 @@ def _grow(trajectory: Trajectory, code: int) -> None:
         raise Unexplored(name)
 
 
+def _never_fired(trajectory: Trajectory) -> list[str]:
+    """The transitions whose guards the start lies beyond, and that have not fired since, by their names."""
+    system, fires = trajectory.system, trajectory.run.fires
+    parts = {each.name: each.part_of or each.name for each in system.transitions}
+    names = dict.fromkeys(parts[name] for name in trajectory.beyond)
+    return [name for name in names if not fires[system.copies_of(name)].any()]
+
+
 def _start_beyond(trajectory: Trajectory) -> Iterator[str]:
     """A note on guards that the start lies beyond."""
     if trajectory.beyond:
@@ -82,6 +94,20 @@ def _start_beyond(trajectory: Trajectory) -> Iterator[str]:
             f"The start lies beyond the guard of {names}. This guard counts as crossed, so only its next "
             "crossing fires. For an event before the mode is entered, give the mode before a transition with "
             "the same guard."
+        )
+
+
+def _turned(trajectory: Trajectory) -> Iterator[str]:
+    """A note on ticks at which two transitions fired whose conditions exclude each other."""
+    run, system = trajectory.run, trajectory.system
+    if run.turned and not system.listed_order:
+        ticks, name = counted(run.turned, "tick"), system.transition_names[run.turned_to]
+        yield (
+            f"At {ticks} two transitions of one clock fired whose conditions (when=) exclude each other: the "
+            f"reset of the first one made the condition of {name!r} true. A "
+            "condition is evaluated at the state after the resets before it. If one transition per tick is "
+            "meant, write a single one whose reset chooses, with np.where. If both are meant, declare "
+            "HybridSystem(listed_order=True)."
         )
 
 
@@ -238,6 +264,8 @@ def _status(trajectory: Trajectory, code: int) -> Status:
             "the first are not known.",
             "Shorten the steps by max_step= of the solver, or ask for fewer exponents.",
         )
+    if code == codes.DONE and (waiting := _never_fired(trajectory)):
+        return beyond_status(waiting)
     if code == codes.DONE and run.unknown_time:
         return Status(StatusCode.INFINITE_SLOPE, f"Reached the end. {_uncertain(trajectory)}", LOWER)
     if code == codes.DONE and run.lateness > MOST_LATENESS:
@@ -263,14 +291,24 @@ def _status(trajectory: Trajectory, code: int) -> Status:
         transitions = [trajectory.system.transitions[i] for i in fired]
         return stuck_status(where, transitions, _faces(trajectory, fired))
     if code == codes.ACCUMULATION and not run.at_rest:
-        return chatter_status(where, [names[i] for i in _recent(trajectory, run.round)])
+        fired = _recent(trajectory, run.round)
+        derived = all(_is_derived(trajectory, i) for i in fired)
+        return chatter_status(where, [names[i] for i in fired], derived=derived)
     last = run.last_fired
     if code in (codes.STEP_TOO_SMALL, codes.NON_FINITE):
         failed = _failed(trajectory, code)
         if failed is not None:
             return failed
     bare_time = trajectory.model.period == 0.0 and trajectory.model.timed.item(run.mode) == 1
-    return run_status(code, where, names[last] if last >= 0 else None, bare_time=bare_time)
+    name, derived = (names[last], _is_derived(trajectory, last)) if last >= 0 else (None, False)
+    return run_status(code, where, name, bare_time=bare_time, derived=derived)
+
+
+def _is_derived(trajectory: Trajectory, transition: int) -> bool:
+    """Whether a transition comes from a switch in the equations: between parts of one mode of the user's."""
+    system = trajectory.system
+    each = system.transitions[transition]
+    return each.part_of is None and system.modes[system.mode_index(each.source)].part_of is not None
 
 
 def _failed(trajectory: Trajectory, code: int) -> Status | None:

@@ -1,13 +1,10 @@
-"""Ctrl-C as a question that is asked between bursts of steps, so that what was computed is kept."""
+"""How long kernels run before Python asks whether to stop, and the status of what was stopped."""
 
 from __future__ import annotations
 
-import signal
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from time import perf_counter
-from typing import Any, Protocol
+from typing import Any
 
 from hybrid.kernels.types import codes
 from hybrid.status import Status, StatusCode
@@ -16,81 +13,6 @@ from hybrid.status import Status, StatusCode
 # a step may become ten times slower from one burst to the next, where numbers leave the normal range.
 FIRST_BURST = 256
 SECONDS = 0.02
-
-
-class Stop(Protocol):
-    """Who may ask a run to stop; asked for longer runs only, inside ``with``."""
-
-    def is_set(self) -> bool:
-        """Whether to stop."""
-        ...
-
-    def __enter__(self) -> Any: ...
-
-    def __exit__(self, *failure: object) -> None: ...
-
-
-# The stop of a thread, if it works for a sweep.
-_OF_THREAD = threading.local()
-
-
-@contextmanager
-def stopped_by(stop: threading.Event) -> Iterator[None]:
-    """Let the runs in this thread end early when ``stop`` is set, as if Ctrl-C had been pressed there."""
-    before = getattr(_OF_THREAD, "stop", None)
-    _OF_THREAD.stop = stop
-    try:
-        yield
-    finally:
-        _OF_THREAD.stop = before
-
-
-class CtrlC:
-    """Ctrl-C while the main thread is inside ``with``: asked for between bursts, not raised anywhere.
-
-    The question may be nested; whoever is outermost decides how long an interrupt holds. A second Ctrl-C is
-    raised at once, and so is one that nobody has asked for. Elsewhere, and where the program has a handler
-    of its own, Ctrl-C stays as it is. A thread inside :func:`stopped_by` is asked for its own stop.
-    """
-
-    def __init__(self) -> None:
-        self.depth = 0
-        self.heard = self.noticed = False
-
-    def is_set(self) -> bool:
-        """Whether Ctrl-C was pressed since the outermost ``with`` began."""
-        if self.heard and _in_main_thread():
-            self.noticed = True
-            return True
-        stop = getattr(_OF_THREAD, "stop", None)
-        return stop is not None and stop.is_set()
-
-    def __enter__(self) -> None:
-        if _in_main_thread():
-            self.depth += 1
-            if self.depth == 1 and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-                signal.signal(signal.SIGINT, self._hear)
-
-    def __exit__(self, *failure: object) -> None:
-        if not _in_main_thread():
-            return
-        self.depth -= 1
-        if self.depth:
-            return
-        if signal.getsignal(signal.SIGINT) == self._hear:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
-        lost = self.heard and not self.noticed and failure[0] is None
-        self.heard = self.noticed = False
-        if lost:
-            raise KeyboardInterrupt
-
-    def _hear(self, number: int, frame: object) -> None:
-        if self.heard:
-            raise KeyboardInterrupt
-        self.heard = True
-
-
-CTRL_C = CtrlC()
 
 
 class Bursts:
@@ -128,10 +50,6 @@ class Bursts:
         if self.stop.is_set():
             return StatusCode.INTERRUPTED
         return codes.GO_ON if ended else code
-
-
-def _in_main_thread() -> bool:
-    return threading.get_ident() == threading.main_thread().ident
 
 
 def interrupted_status(what: str) -> Status:

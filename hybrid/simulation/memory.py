@@ -224,6 +224,7 @@ def run_layout(dimension: int, tangents: int, modes: int, transitions: int, tick
         "on_guard": (transitions,),
         "due": (transitions,),
         "recent": (RECENT,),
+        "fires": (transitions,),
         "rehearsal": (4, transitions),
         "passed": (transitions,),
         "unproved": (transitions,),

@@ -11,10 +11,11 @@ import numpy as np
 from hybrid import arguments
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.compiled import CompiledSystem, compile_system
+from hybrid.compiler.interrupts import CTRL_C, Stop, raise_if_dropped
 from hybrid.kernels.types import codes
 from hybrid.kernels.types.codes import UNLIMITED
 from hybrid.simulation.initial_mode import choose_mode
-from hybrid.simulation.interrupt import CTRL_C, FIRST_BURST, Bursts, Stop
+from hybrid.simulation.interrupt import FIRST_BURST, Bursts
 from hybrid.simulation.memory import Memory, put_tangents
 from hybrid.simulation.periods import check_time, split_time, time_at
 from hybrid.simulation.plan import Plan, check_solver, plan_of
@@ -109,6 +110,7 @@ class Common:
         self, state: np.ndarray, mode: str | None, model_of: Callable[[Plan, Memory], Any]
     ) -> Trajectory:
         """A trajectory at its start; ``model_of(plan, memory)`` is the model at the parameters of the run."""
+        raise_if_dropped()
         compiled, tangents = self.compiled, 0 if self.tangent is None else self.tangent.shape[1]
         plan = plan_of(compiled, self.solver, tangents)
         memory = plan.memory()

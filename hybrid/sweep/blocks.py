@@ -6,8 +6,8 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 
+from hybrid.compiler.interrupts import CTRL_C, stopped_by
 from hybrid.display.progress import Progress
-from hybrid.simulation.interrupt import CTRL_C, stopped_by
 from hybrid.sweep.local import LOOK
 
 # Blocks that a thread takes one after another: enough of them that threads end at about the same time.

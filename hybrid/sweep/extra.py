@@ -23,3 +23,13 @@ def needed(package: str, argument: str) -> Any:
             f"{argument} needs the package {package}, which is not installed. "
             "Install it with: pip install 'hybrid-systems[grid]'."
         ) from None
+
+
+def load_xarray() -> None:
+    """Import all that the first dataset of xarray imports, such as Dask.
+
+    Called before runs, so that their results come at once after Ctrl-C.
+    """
+    import xarray
+
+    xarray.Dataset({"nothing": ("axis", [0.0])})

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from queue import Empty, Queue, SimpleQueue
+from time import perf_counter
 from typing import Any
 
 import attrs
 import numpy as np
 
-from hybrid.simulation.interrupt import CTRL_C, stopped_by
+from hybrid.compiler.interrupts import CTRL_C, stopped_by
 from hybrid.sweep.job import Job, Rhythm, carried
 from hybrid.sweep.outcome import Batch, Outcome, Part, attempt
 
-# Seconds between two looks for Ctrl-C.
-LOOK = 0.05
+# Seconds between two looks for Ctrl-C, and how long workers may take to end after it: a task that calls
+# nothing of the library is not told, and its point is given up.
+LOOK, GRACE = 0.05, 0.4
 
 
 def cores() -> int:
@@ -40,14 +43,21 @@ def run_in_threads(
     if pool is not None:
         return _Run(job, keep, stored).run(pool, pool._max_workers, report)
     workers = min(threads or cores(), max(len(job.rows), 1))
-    with ThreadPoolExecutor(workers, thread_name_prefix="sweep") as own:
+    own = ThreadPoolExecutor(workers, thread_name_prefix="sweep")
+    try:
         return _Run(job, keep, stored).run(own, workers, report)
+    finally:
+        # The workers have ended by now, or have been given up.
+        own.shutdown(wait=False)
 
 
 class _Run:
     def __init__(self, job: Job, keep: Callable[[Part], None], stored: bool) -> None:
         self.job, self.keep, self.stored = job, keep, stored
         self.stop = threading.Event()
+        self.lock, self.is_over = threading.Lock(), False
+        # What the workers have computed and not passed on yet.
+        self.batches: list[Batch] = []
         # Numbers of points that were kept, an error, or None from a worker that has ended.
         # A SimpleQueue waits without end if its time is over when it has heard a signal.
         self.reports: Queue[int | BaseException | None] = Queue()
@@ -55,18 +65,19 @@ class _Run:
 
     def run(self, pool: ThreadPoolExecutor, workers: int, report: Callable[[int], object]) -> bool:
         """Start the workers and wait for them."""
-        failure, working = None, workers
+        failure, working, latest = None, workers, math.inf
         with CTRL_C:
             try:
                 for _ in range(workers):
                     pool.submit(self._work)
-                while working:
+                while working and perf_counter() < latest:
                     try:
                         news = self.reports.get(timeout=LOOK)
                     except Empty:
                         news = 0
                     if CTRL_C.is_set():
                         self._halt()
+                        latest = min(latest, perf_counter() + GRACE)
                     if news is None:
                         working -= 1
                     elif isinstance(news, BaseException):
@@ -76,6 +87,11 @@ class _Run:
                         report(news)
             finally:
                 self._halt()
+                with self.lock:
+                    self.is_over = True
+                    # Those of workers that have been given up.
+                    for part in (part for batch in self.batches for part in batch.taken()):
+                        self.keep(part)
             if failure is not None:
                 raise failure
             return not CTRL_C.is_set()
@@ -88,15 +104,23 @@ class _Run:
     def _work(self) -> None:
         """Compute points until there are none, or until the sweep stops."""
         batch, rhythm = Batch(), Rhythm(self.stored)
+        self.batches.append(batch)
         try:
-            with stopped_by(self.stop):
-                for row, outcome in self.source.outcomes():
-                    # A point that was computed while the sweep stopped may be incomplete.
-                    if self.stop.is_set():
-                        break
-                    batch.add(row, outcome)
-                    if rhythm.is_due():
-                        self._pass_on(batch)
+            try:
+                with stopped_by(self.stop, dropped=True):
+                    for row, outcome in self.source.outcomes():
+                        # A point that was computed while the sweep stopped may be incomplete.
+                        if self.stop.is_set():
+                            break
+                        with self.lock:
+                            if not self.is_over:
+                                batch.add(row, outcome)
+                        if rhythm.is_due():
+                            self._pass_on(batch)
+            except KeyboardInterrupt:
+                # The point in hand is dropped; the others are kept.
+                if not self.stop.is_set():
+                    raise
             self._pass_on(batch)
         except BaseException as failure:
             self.reports.put(failure)
@@ -106,9 +130,10 @@ class _Run:
             self.reports.put(None)
 
     def _pass_on(self, batch: Batch) -> None:
-        count = batch.count
-        for part in batch.taken():
-            self.keep(part)
+        with self.lock:
+            count = batch.count
+            for part in batch.taken():
+                self.keep(part)
         self.reports.put(count)
 
 

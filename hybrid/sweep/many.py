@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike
 from hybrid import arguments
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.compiled import compile_system
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import progress_bar
 from hybrid.errors import ArgumentError, HybridError
 from hybrid.kernels.types import codes
 from hybrid.simulation.ending import status_of
-from hybrid.simulation.interrupt import CTRL_C, Bursts
+from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.memory import starts_of
 from hybrid.simulation.periods import check_time, split_time
@@ -26,6 +27,7 @@ from hybrid.simulation.trajectory import Trajectory
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
 from hybrid.sweep.blocks import run_in_blocks
+from hybrid.sweep.extra import load_xarray
 from hybrid.sweep.local import cores
 from hybrid.sweep.outcome import text_of
 from hybrid.sweep.sheet import UNTOUCHED, flags
@@ -95,8 +97,7 @@ def simulate_many(
     [1, 1, 1]
     """
     as_system("system", system)
-    # Before the runs, so that their results come at once after Ctrl-C.
-    import xarray  # noqa: F401
+    load_xarray()
 
     t0, t1 = arguments.time_span("t_span", t_span)
     times = np.empty(0) if samples is None else arguments.increasing_times("samples", samples, t0, t1)

@@ -148,7 +148,7 @@ def _check_name(name: object) -> None:
 
 
 def _numbers(name: str, value: object) -> np.ndarray:
-    values = arguments.numbers(name, getattr(value, "values", value), NUMBERS)
+    values = arguments.numbers(name, value, NUMBERS)
     if values.ndim != 1 or values.size == 0:
         raise ArgumentError(f"{name} must {NUMBERS}; got shape {values.shape}.")
     if not np.isfinite(values).all():

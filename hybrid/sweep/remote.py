@@ -16,8 +16,8 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.errors import HybridError
-from hybrid.simulation.interrupt import CTRL_C
 from hybrid.status import StatusCode
 from hybrid.sweep.extra import needed
 from hybrid.sweep.job import Job, computed

@@ -23,6 +23,7 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.errors import ArgumentError, HybridError
+from hybrid.simulation.seal import SEAL, check_seal, read_file, read_folder, sealed
 from hybrid.sweep.extra import needed
 from hybrid.sweep.outcome import UNFINISHED, Part
 from hybrid.sweep.parts import DamagedError, read_part, written
@@ -213,7 +214,7 @@ def open_store(path: str | os.PathLike[str]) -> xarray.Dataset:
     Raises
     ------
     ArgumentError
-        If there is no store.
+        If there is no store, or if the file is incomplete or damaged.
 
     Examples
     --------
@@ -222,14 +223,12 @@ def open_store(path: str | os.PathLike[str]) -> xarray.Dataset:
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     squares = hybrid.sweep(lambda point: {"square": point["a"] ** 2}, {"a": [1.0, 2.0, 3.0]})
     ...     squares.to_netcdf(f"{folder}/squares.nc")
-    ...     open_store(f"{folder}/squares.nc").load().square.values.tolist()
+    ...     open_store(f"{folder}/squares.nc").square.values.tolist()
     [1.0, 4.0, 9.0]
     """
-    import xarray
-
     where = as_path(path, "path")
     if where.is_file():
-        return xarray.open_dataset(where)
+        return read_file("path", where)
     latest = _read(where / INSIDE / LATEST)
     # A group without the parts is the copy of a store. Otherwise a damaged group, or one that another call
     # is laying out, is made again from the parts.
@@ -238,10 +237,15 @@ def open_store(path: str | os.PathLike[str]) -> xarray.Dataset:
         # A later call with another grid first removes the file that makes the folder a group.
         before, found = _read(where / GROUP), None
         try:
-            found = xarray.open_zarr(where, chunks=None).load()
-        except Exception as failure:  # each codec has its own errors
+            found = read_folder("path", where)
+            # Other datasets that were saved as a group have no seal.
+            if SEAL in found.attrs:
+                check_seal("path", found, str(where))
+                del found.attrs[SEAL]
+        except ArgumentError:
+            found = None
             if not latest:
-                raise HybridError(f"path: the zarr group {str(where)!r} is damaged: {failure}.") from failure
+                raise
         if found is not None and before and before == _read(where / GROUP):
             last = [name for name in RESERVED if name in found.data_vars]
             return found[[name for name in found.data_vars if name not in RESERVED] + last]
@@ -397,7 +401,7 @@ def _lay_out(found: xarray.Dataset, path: Path) -> None:
         with warnings.catch_warnings():
             # Texts and consolidated metadata are extensions of zarr's format 3.
             warnings.simplefilter("ignore")
-            found.to_zarr(new, zarr_format=3, consolidated=True)
+            sealed(found).to_zarr(new, zarr_format=3, consolidated=True)
         (path / GROUP).unlink(missing_ok=True)
         for old in path.iterdir():
             if not old.name.startswith("."):

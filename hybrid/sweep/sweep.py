@@ -13,6 +13,7 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.display.progress import progress_bar
+from hybrid.sweep.extra import load_xarray
 from hybrid.sweep.identity import attributes_of, facts_of
 from hybrid.sweep.job import Job
 from hybrid.sweep.local import run_in_threads
@@ -92,8 +93,7 @@ def sweep(
         as_executor(executor)
     along = getattr(task, "along", None)
     lines = None if along is None else points.lines(along)
-    # Before the runs, so that their results come at once after Ctrl-C.
-    import xarray  # noqa: F401
+    load_xarray()
 
     labels = getattr(task, "labels", None) or Labels()
     sheet = Sheet(points)

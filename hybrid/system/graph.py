@@ -198,7 +198,7 @@ class HybridSystem(Portable):
     _compiled: Any = attrs.field(default=None, init=False, repr=False)
     # The system with the time since the entry of a mode as a component, with the same lifetime.
     _aged: Any = attrs.field(default=None, init=False, repr=False)
-    # The function that has made this system from another one, and that one.
+    # The function that has made this system from another one, and its arguments, that one first.
     _made_by: Any = attrs.field(default=None, init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
@@ -212,8 +212,8 @@ class HybridSystem(Portable):
     def __reduce__(self) -> tuple[Any, ...]:
         if self._made_by is None:
             return Portable.__reduce__(self)
-        function, original = self._made_by
-        return function, (original,)
+        function, *arguments = self._made_by
+        return function, tuple(arguments)
 
     @property
     def is_whole(self) -> bool:

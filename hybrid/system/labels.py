@@ -39,6 +39,8 @@ def by_label(name: str, value: Any) -> dict[Any, Any] | None:
     """
     if type(value) in UNLABELLED:
         return None
+    if arguments.has_units(value):
+        raise arguments.refusal(name, "hold numbers without units", value)
     if isinstance(value, Mapping):
         inner = named(name, value).items()
         return {label: each if _labels_of(each) is None else np.asarray(each) for label, each in inner}

@@ -7,12 +7,14 @@ import pickle
 import sys
 from collections.abc import Callable
 from types import FrameType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import attrs
 
 from hybrid.arguments import shown
 from hybrid.errors import ModelError
+
+Made = TypeVar("Made")
 
 # The pickler in C and the one in Python.
 PICKLERS = (pickle.Pickler, pickle._Pickler)
@@ -44,6 +46,12 @@ class Portable:
                 "Define it with def at the top level of a module, or pickle with cloudpickle."
             )
         return value
+
+
+def made_by(made: Made, function: Callable[..., Any], *arguments: Any) -> Made:
+    """The same object, which is pickled as the call that has made it: what a system derives has no name."""
+    object.__setattr__(made, "_made_by", (function, *arguments))
+    return made
 
 
 def _made_again(kind: type[Any], fields: dict[str, Any]) -> Any:

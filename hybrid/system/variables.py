@@ -201,7 +201,7 @@ class Variables:
         if found is None:
             raise ArgumentError(
                 f"{name} must hold {self.dimension} numbers; got {arguments.shown(value)}. "
-                f"The state is {', '.join(names)}."
+                f"The state is {', '.join(names)}.{arguments.without_units(value)}"
             )
         found = self.completed(found)
         if found.shape != (self.dimension,):

@@ -41,7 +41,7 @@ PLACES = 20
 # A guard is zero at a jump if it is at most this share of its size on the run.
 ON_GUARD = 1e-9
 # How runs end that reach the end of their span, or an end that the model provides.
-AS_MEANT = (StatusCode.SUCCESS, StatusCode.TERMINAL)
+AS_MEANT = (StatusCode.SUCCESS, StatusCode.START_BEYOND, StatusCode.TERMINAL)
 
 
 @attrs.frozen(eq=False)

@@ -20,6 +20,7 @@ from hybrid.system.entries import enters_anew, has_age
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem, watched_below
 from hybrid.system.growth import Growth
+from hybrid.system.portable import made_by
 from hybrid.system.variables import STATE, named_values
 
 AGE = "age"
@@ -35,8 +36,7 @@ def aged(system: HybridSystem) -> HybridSystem:
     if system.age is not None or not system.aging:
         return system
     if system._aged is None or not system._aged.derived_from.holds():
-        made = _Aging(system).system()
-        object.__setattr__(made, "_made_by", (aged, system))
+        made = made_by(_Aging(system).system(), aged, system)
         object.__setattr__(system, "_aged", made)
     found: HybridSystem = system._aged
     return found
@@ -44,7 +44,7 @@ def aged(system: HybridSystem) -> HybridSystem:
 
 def original_of(system: HybridSystem) -> HybridSystem:
     """The system whose aged one this is; itself if there is none."""
-    if system._made_by is None:
+    if system._made_by is None or system._made_by[0] is not aged:
         return system
     found: HybridSystem = system._made_by[1]
     return found

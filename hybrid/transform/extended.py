@@ -16,6 +16,7 @@ from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeField, WholeReset
 from hybrid.system.graph import HybridSystem, watched_below
 from hybrid.system.laws import Laws
+from hybrid.system.portable import made_by
 from hybrid.system.variables import PARAMETERS, STATE, named_values
 
 _EXTENDED: WeakKeyDictionary[HybridSystem, dict[tuple[str, ...], HybridSystem]] = WeakKeyDictionary()
@@ -31,7 +32,7 @@ def extended(system: HybridSystem, names: tuple[str, ...]) -> HybridSystem:
     """
     made = _EXTENDED.setdefault(system, {})
     if names not in made or not made[names].derived_from.holds():
-        made[names] = _Extension(system, names).system()
+        made[names] = made_by(_Extension(system, names).system(), extended, system, names)
     return made[names]
 
 

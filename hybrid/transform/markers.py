@@ -6,6 +6,7 @@ import attrs
 
 from hybrid.system.elements import Guard, Transition
 from hybrid.system.graph import HybridSystem
+from hybrid.system.portable import made_by
 
 MARKER = "section"
 
@@ -16,4 +17,5 @@ def with_section(system: HybridSystem, section: Guard) -> HybridSystem:
     The markers come first: where an event lies on the section, the point before the event counts.
     """
     markers = [Transition(name, name, section, name=f"{MARKER} in {name}") for name in system.mode_names]
-    return attrs.evolve(system, transitions=(*markers, *system.transitions))
+    marked = attrs.evolve(system, transitions=(*markers, *system.transitions))
+    return made_by(marked, with_section, system, section)

@@ -10,12 +10,13 @@ import attrs
 from hybrid.system.elements import Mode
 from hybrid.system.graph import HybridSystem
 from hybrid.system.laws import Laws
+from hybrid.system.portable import made_by
 
 _RESTRICTED: WeakKeyDictionary[HybridSystem, dict[Any, HybridSystem]] = WeakKeyDictionary()
 
 
 def restricted(
-    system: HybridSystem, mode: str, transitions: tuple[str, ...] = (), *, backwards: bool = False
+    system: HybridSystem, mode: str, transitions: tuple[str, ...] = (), backwards: bool = False
 ) -> HybridSystem:
     """The flow of one mode, with those transitions alone and the modes that they lead to.
 
@@ -28,13 +29,14 @@ def restricted(
         kept = [each for each in system.transitions if each.name in transitions]
         ends = {end for each in kept for end in (each.source, each.target, each.accumulates_to)}
         modes = [each for each in system.modes if each.name == mode or each.name in ends]
-        made[key] = attrs.evolve(
+        found = attrs.evolve(
             system,
             modes=[_backwards(each) for each in modes] if backwards else modes,
             transitions=kept,
             start=None,
             laws=Laws(),
         )
+        made[key] = made_by(found, restricted, system, *key)
     return made[key]
 
 

@@ -13,7 +13,7 @@ from hybrid.status import StatusCode, chatter_status
     ],
 )
 def test_one_transition_or_several_in_turn(names, told):
-    status = chatter_status("at t = 1", names)
+    status = chatter_status("at t = 1", names, derived=False)
     assert status.code == StatusCode.ACCUMULATION
     assert not status.ok
     assert status.message.startswith(f"{told} at t = 1")

@@ -341,7 +341,7 @@ def test_minus_infinity_and_failed_rows_are_marked_and_explained():
     assert (lost.get_xdata().tolist(), failed.get_xdata().tolist()) == ([1.0], [0.5])
     told = [text.get_text() for text in ax.get_legend().get_texts()]
     assert "minus infinity" in told[-2]
-    assert "failed" in told[-1]
+    assert "MAX_STEPS" in told[-1]
     assert ax.get_ylabel() == "Lyapunov exponents (1/s)"
 
 
@@ -353,7 +353,7 @@ def test_a_map_tells_minus_infinity_from_failed_rows():
     assert values.mask.tolist() == [[False, False], [True, True]]
     assert lost.mask.tolist() == [[True, True], [False, True]]
     assert {text.get_text() for text in ax.get_legend().get_texts()} == {
-        "failed, see chart.message",
+        "MAX_STEPS, see chart.message",
         "minus infinity",
     }
 

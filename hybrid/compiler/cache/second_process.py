@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from hybrid.compiler.cache.folder import PACKAGE, cache_directory
+from hybrid.compiler.interrupts import CTRL_C
 
 # Seconds between two looks at what the second process has done.
 LOOK = 0.02
@@ -47,6 +48,7 @@ def start(modules: Sequence[str]) -> None:
 def wait_for(is_done: Callable[[], bool]) -> None:
     """Wait until something is done, or until the second process, if there is one, has ended."""
     while _helpers and not is_done():
+        CTRL_C.raise_if_set()
         try:
             _helpers[-1].wait(LOOK)
         except subprocess.TimeoutExpired:

@@ -196,3 +196,26 @@ def ticking(model, run, work):
         if not copy and ticks_now(model, run, transition):
             pass_tick(model, run, transition, False)
     return fires
+
+
+@njit(**KERNEL)
+def turned_to(model, run, fired, x_minus, scalar):
+    """The transition that takes the turn of one that has just fired at the same tick of its clock, if any.
+
+    Of two conditions exactly one held before the jump at the state ``x_minus``, and exactly the other one
+    holds after it: they choose one of two transitions, and the reset of the first has made both fire.
+    """
+    mode, t = run.mode, run.phase
+    # Where the mode is entered anew, its dwell times begin anew.
+    restarts = model.clock[fired] == AFTER and model.enters[fired] == 1
+    if restarts or mode != run.previous_mode or allowed(model, fired, t, run.y, scalar):
+        return NO_TRANSITION
+    for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
+        other = model.clocks[slot]
+        if model.clock_of[other] != model.clock_of[fired] or model.tick_of[other] == model.tick_of[fired]:
+            continue
+        if not ticks_now(model, run, other) or allowed(model, other, t, x_minus, scalar):
+            continue
+        if allowed(model, other, t, run.y, scalar):
+            return other
+    return NO_TRANSITION

@@ -207,6 +207,7 @@ def move(model, run, transition, target, x_plus):
     run.last_jump_cycle = run.cycle
     run.recent[slot_of(run, run.jumps)] = transition
     run.jumps += 1
+    run.fires[transition] += 1
     run.last_fired = transition
     run.stay[run.mode], run.since_entry = run.since_entry, 0.0
     run.previous_mode = run.mode

@@ -249,6 +249,8 @@ COUNTERS = (
     "field_jumps",
     "jumped_in",
     "entry_cycle",
+    "turned",
+    "turned_to",
 )
 NUMBERS = (
     "phase",
@@ -289,7 +291,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     - ``on_guard (transitions,)``: 1 if the guard vanishes at the last event or entry and has not been left
       since; 2 if its speed vanishes too, 3 if its acceleration does as well, 4 if it jumps across zero there.
     - ``due (transitions,)``: 1 if the guard has been crossed at this instant and has not fired yet.
-    - ``recent``: the last transitions that fired; jump ``j`` is at ``j`` modulo the length.
+    - ``recent``: the last to fire; jump ``j`` is at ``j`` modulo the length. ``fires``: how often each has.
     - ``visits (64, n + 2)``: the states right after those jumps, with their phases and cycles.
     - ``rehearsal (4, transitions)``: scratch for jumps that are only tried; in the last row, the sides of
       guards before the crossings found on the last step.
@@ -300,6 +302,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
       of the first tick of a clock that has not fired anything yet. ``ticks`` are the numbers of all
       clocks, those of a transition from ``model.first_tick`` on: period and offset, or times, or a duration.
       The mode was entered in the period ``entry_cycle`` at ``entry_phase``, and ``entry_low`` of rounding.
+    - ``turned``: jumps at ticks that changed which transition of their clock may fire, last to ``turned_to``.
     - ``horizon``: how long the run takes, as far as it is known at its start; 0 if it is not.
     - ``longest_step``: the longest step in time so far; ``lateness``: the largest change that the rounding of
       the time made in a step or jump, in tolerances.
@@ -309,8 +312,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     - ``scale (n,)``: the size of the components over the last step; rounding is judged against it.
     - ``stretch (n,)``: the state after ``stretch_steps`` steps, with the time ``stretch_left`` left. From
       there the run has to get on. ``stretch_moved`` is 1 if the state has moved since.
-    - ``growth (k,)``: sums of the logarithms of the lengths that orthonormalisation took out of the tangent
-      vectors.
+    - ``growth (k,)``: sums of the logarithms of the lengths that orthonormalisation took out of tangents.
     - ``trail (4, n + 1)``: follows jumps to their limit; its rows have names (``codes``).
     - ``before (n k,)``, ``growth_before (k,)``: the tangent vectors and their growth before a jump that sets
       off others at the same instant.
@@ -326,6 +328,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     on_guard: INDICES
     due: INDICES
     recent: INDICES
+    fires: INDICES
     rehearsal: INDEX_MATRIX
     passed: VECTOR
     unproved: INDICES

@@ -33,4 +33,4 @@ def is_plain(model, run, beyond):
             return False
     may_run_dry = model.steep[run.mode] == 1 and model.propagator[run.mode] == RUNGE_KUTTA
     uncertain = run.unknown_time != 0.0 or run.lateness > MOST_LATENESS or may_run_dry
-    return steps + run.order_mattered + held + beyond == 0 and not uncertain
+    return steps + run.order_mattered + run.turned + held + beyond == 0 and not uncertain

@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.display.tables import counted
 from hybrid.errors import ArgumentError
@@ -19,7 +20,7 @@ from hybrid.orbits.continuation.place import Place, place_of, place_on
 from hybrid.orbits.continuation.result import Points, orbit_of, whole_orbit_of
 from hybrid.orbits.continuation.route import Loop
 from hybrid.orbits.orbit import PeriodicOrbit, unaged
-from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import Solver, Taylor
@@ -289,15 +290,16 @@ def _both_ways(
     why: list[str] = []
     for sign in (-1.0, 1.0):
         items = items[::-1]
-        for item in along_curve(curve, attrs.evolve(begin, way=sign * begin.way), lows, highs, most):
-            if isinstance(item, str):
-                why.append(item)
-                break
-            items.append(item)
-            bar.update(isinstance(item, Spot))
-            if CTRL_C.is_set():
-                return items, why
-        if why[-1] == "closed":
+        with CTRL_C.ending():
+            for item in along_curve(curve, attrs.evolve(begin, way=sign * begin.way), lows, highs, most):
+                if isinstance(item, str):
+                    why.append(item)
+                    break
+                items.append(item)
+                bar.update(isinstance(item, Spot))
+                if CTRL_C.is_set():
+                    break
+        if CTRL_C.is_set() or why[-1] == "closed":
             break
     return items, why
 

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import attrs
 import numpy as np
 
 from hybrid import arguments
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
 from hybrid.orbits.continuation.crossing import crossing, flip_coefficient, fold_coefficient, is_supercritical
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import Place, moment, place_on, share_of
 from hybrid.orbits.continuation.result import Points, mode_at, whole_orbit_of
 from hybrid.orbits.continuation.walk import Event, walk
 from hybrid.orbits.orbit import PeriodicOrbit, unaged
 from hybrid.orbits.sensitivity import is_isolated
-from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import Solver, Taylor
 from hybrid.status import SUCCESS, Status, StatusCode
@@ -26,6 +30,8 @@ Item = Place | Event
 
 # A multiplier is -1 if it is this near.
 AT_MINUS_ONE = 1e-3
+# And 1 if it is this near: that of a family is the double root of an equation.
+NEAR_ONE = 1e-3
 
 ENDS = {
     "range": "the end of the range",
@@ -37,8 +43,8 @@ ENDS = {
 }
 
 MANY = (
-    "There are other orbits beside each: the one that is nearest to the orbit before is taken, and no "
-    "conserved quantity is held."
+    "A multiplier is 1, so there are other orbits beside each: the one that is nearest to the orbit before "
+    "is taken, and no conserved quantity is held."
 )
 
 
@@ -137,18 +143,28 @@ def _branch(
         why.append(_walked(attrs.evolve(begin, tangents=sign * begin.tangents), low, high, most, items, bar))
         if why[-1] in ("closed", "interrupted"):
             break
-    return branch_of(items, points), why, is_isolated(begin)
+    return branch_of(items, points), why, not _is_one_of_many(begin)
+
+
+def _is_one_of_many(place: Place) -> bool:
+    """Whether there are other orbits beside one at the same parameters.
+
+    They have a multiplier that is 1. The equations may be nearly singular without one: their sizes differ.
+    """
+    ones = np.abs(place.orbit.free_multipliers - 1.0) <= NEAR_ONE
+    return bool(np.any(ones)) and not is_isolated(place)
 
 
 def _walked(begin: Place, low: float, high: float, most: int, items: list[Item], bar: Progress) -> str:
     """Walk from a place; what is met goes to the items. Returns why the walk ends."""
-    for item in walk(begin, low, high, most):
-        if isinstance(item, str):
-            return item
-        items.append(item)
-        bar.update(isinstance(item, Place))
-        if CTRL_C.is_set():
-            break
+    with CTRL_C.ending():
+        for item in walk(begin, low, high, most):
+            if isinstance(item, str):
+                return item
+            items.append(item)
+            bar.update(isinstance(item, Place))
+            if CTRL_C.is_set():
+                break
     return "interrupted"
 
 
@@ -174,9 +190,31 @@ def branch_of(items: list[Item], points: Points) -> Branch:
             if isinstance(item, Event)
         ),
         status=SUCCESS,
-        orbit=lambda i: whole_orbit_of(passes[i], points),
+        orbit=_OrbitOf(passes, points),
     )
     return _unaged(branch)
+
+
+# Functions that remember are classes here: a branch is pickled with them.
+@attrs.frozen(eq=False)
+class _OrbitOf:
+    """The orbit of a point of a branch."""
+
+    passes: list[Pass]
+    points: Points
+
+    def __call__(self, i: int) -> PeriodicOrbit:
+        return whole_orbit_of(self.passes[i], self.points)
+
+
+@attrs.frozen(eq=False)
+class _WithoutAge:
+    """The orbit of a point of a branch, without the age."""
+
+    orbit: Callable[[int], PeriodicOrbit]
+
+    def __call__(self, i: int) -> PeriodicOrbit:
+        return unaged([self.orbit(i)])[0]
 
 
 def _unaged(branch: Branch) -> Branch:
@@ -191,7 +229,7 @@ def _unaged(branch: Branch) -> Branch:
         x0=np.delete(branch.x0, age, axis=1),
         multipliers=branch.multipliers[:, :-1],
         bifurcations=tuple(_without_component(each, age) for each in branch.bifurcations),
-        orbit=lambda i: unaged([branch.orbit(i)])[0],
+        orbit=_WithoutAge(branch.orbit),
     )
 
 

@@ -80,8 +80,8 @@ def fold_coefficient(place: Place) -> float | None:
     ends = [each[0] for each in made if each is not None]
     middle = 0.5 * (ends[0].value + ends[1].value) - place.value
     sizes = np.where(place.orbit.own_scale > 0.0, place.orbit.own_scale, 1.0)
-    change = 0.5 * (ends[0].orbit.loop.x - ends[1].orbit.loop.x) / sizes
-    return float(middle / np.abs(change).max() ** 2)
+    change = float(np.abs(0.5 * (ends[0].orbit.loop.x - ends[1].orbit.loop.x) / sizes).max())
+    return float(middle / change**2) if change > 0.0 else None
 
 
 def flip_coefficient(place: Place, doubled: Pass) -> float:

@@ -23,7 +23,8 @@ def square_root_coefficient(orbit: Pass, key: Key) -> np.ndarray | None:
     ``x`` is where an orbit nearby would be farthest beyond the guard without the jump, by ``H > 0``. It comes
     to the guard with the speed ``sqrt(2 a H)``, ``a`` being the guard's acceleration, and jumps there: with
     the field ``f`` and the reset ``R``, ``C = -(D_x R f + D_t R - f) sqrt(2 / a)``. None where the touched
-    transition leads to another mode or moves the state: the map has another leading order.
+    transition leads to another mode or moves the state, or the guard has no acceleration: the map has another
+    leading order.
 
     A. B. Nordmark, "Non-periodic motion caused by grazing incidence in an impact oscillator", Journal of
     Sound and Vibration 145 (1991) 279; M. di Bernardo, C. Budd, A. Champneys, P. Kowalczyk, Piecewise-smooth
@@ -32,7 +33,8 @@ def square_root_coefficient(orbit: Pass, key: Key) -> np.ndarray | None:
     touch = _touch_of(orbit, key)
     if touch is None or not touch.stays or touch.kick is None:
         return None
-    return -touch.kick * np.sqrt(2.0 / abs(_acceleration(orbit, key, touch.share)))
+    acceleration = abs(_acceleration(orbit, key, touch.share))
+    return -touch.kick * np.sqrt(2.0 / acceleration) if acceleration > 0.0 else None
 
 
 def kick(orbit: Pass, key: Key) -> np.ndarray | None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.simulation.labelled import Names, attributes
+from hybrid.simulation.seal import sealed
 
 if TYPE_CHECKING:
     import xarray
@@ -53,4 +54,4 @@ def dataset_of(branch: Any) -> xarray.Dataset:
     }
     coords = {branch.name: ("point", branch.parameter, names.of(branch.name)), **names.coords()}
     made_by = attributes(KIND, branch.status, branch.system, branch.orbit(0).parameters)
-    return xarray.Dataset(variables, coords, {**made_by, "parameter": branch.name})
+    return sealed(xarray.Dataset(variables, coords, {**made_by, "parameter": branch.name}))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import attrs
 import numpy as np
 
 from hybrid import arguments
@@ -15,6 +16,7 @@ from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
 from hybrid.orbits.continuation.labelled import KIND, SIDES
 from hybrid.orbits.orbit import PeriodicOrbit, turns_over
+from hybrid.simulation.seal import check_seal, read_file, read_folder
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Taylor
 from hybrid.status import SUCCESS, Status, StatusCode
@@ -26,7 +28,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-def open_branch(system: HybridSystem, saved: xarray.Dataset | str | Path) -> Branch:
+def open_branch(system: HybridSystem, saved: xarray.Dataset | str | os.PathLike[str]) -> Branch:
     """A branch from what its `to_xarray` gave, to look at it, to draw it and to take it further.
 
     Parameters
@@ -34,7 +36,7 @@ def open_branch(system: HybridSystem, saved: xarray.Dataset | str | Path) -> Bra
     system
         The model, which is not saved.
     saved
-        The dataset, or the folder of zarr where it is.
+        The dataset, or the folder of zarr (or the file) where it is.
 
     Returns
     -------
@@ -44,7 +46,8 @@ def open_branch(system: HybridSystem, saved: xarray.Dataset | str | Path) -> Bra
     Raises
     ------
     ArgumentError
-        If it is no branch, or one of another system.
+        If it is no branch, or one of another system; if the save is incomplete or damaged, or the dataset was
+        changed.
 
     Examples
     --------
@@ -59,12 +62,14 @@ def open_branch(system: HybridSystem, saved: xarray.Dataset | str | Path) -> Bra
     import xarray
 
     as_system("system", system)
-    if isinstance(saved, (str, Path)):
-        # What is no folder is refused below.
-        with suppress(OSError, ValueError):
-            saved = xarray.open_zarr(saved).load()
-    if not isinstance(saved, xarray.Dataset) or saved.attrs.get("kind") != KIND:
-        raise arguments.refusal("saved", "be the dataset of a branch, or a folder where it is", saved)
+    place = ""
+    if isinstance(saved, str | os.PathLike) and os.path.exists(saved):
+        place = os.fspath(saved)
+        saved = read_folder("saved", Path(place)) if os.path.isdir(place) else read_file("saved", Path(place))
+    # A save that was killed early has no kind yet: its seal is missing, too.
+    if not isinstance(saved, xarray.Dataset) or saved.attrs.get("kind", KIND) != KIND:
+        raise arguments.refusal("saved", "be the dataset of a branch, or a folder or file where it is", saved)
+    check_seal("saved", saved, place)
     if len(saved.state) > system.dimension:
         # Points of the branch lie in modes where the time since the entry counts.
         system = aged(system)
@@ -75,15 +80,10 @@ def open_branch(system: HybridSystem, saved: xarray.Dataset | str | Path) -> Bra
         )
     name = str(saved.attrs["parameter"])
     known = json.loads(saved.attrs["model_parameters"])
-    values = np.asarray(saved[name], dtype=float)
-
-    def orbit(i: int) -> PeriodicOrbit:
-        return _orbit(system, {**known, name: float(values[i])}, saved.isel(point=i), "")
-
     return Branch(
         system=system,
         name=name,
-        parameter=values,
+        parameter=np.asarray(saved[name], dtype=float),
         x0=saved.x0.values,
         mode=saved["mode"].values.astype(str),
         period=saved.period.values,
@@ -94,8 +94,22 @@ def open_branch(system: HybridSystem, saved: xarray.Dataset | str | Path) -> Bra
             for i in range(saved.sizes["bifurcation"])
         ),
         status=Status(StatusCode[saved.attrs["status"]], saved.attrs["message"]),
-        orbit=orbit,
+        orbit=_SavedOrbit(system, known, name, saved),
     )
+
+
+@attrs.frozen(eq=False)
+class _SavedOrbit:
+    """The orbit of a point of a saved branch; a class, so that the branch can be pickled."""
+
+    system: HybridSystem
+    known: Mapping[str, float]
+    name: str
+    saved: xarray.Dataset
+
+    def __call__(self, i: int) -> PeriodicOrbit:
+        row = self.saved.isel(point=i)
+        return _orbit(self.system, {**self.known, self.name: float(row[self.name])}, row, "")
 
 
 def _bifurcation(

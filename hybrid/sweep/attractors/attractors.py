@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from hybrid import arguments
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import progress_bar
 from hybrid.kernels.types import codes
-from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode

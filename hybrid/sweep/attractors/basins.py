@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
-from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
@@ -23,6 +24,7 @@ from hybrid.sweep.attractors.runs import CODE, NONE, OWNER, POINTS, runs_of
 from hybrid.sweep.attractors.search import FIRST_POINTS, Search, known_of
 from hybrid.sweep.attractors.setup import Setup, digest, setup_of
 from hybrid.sweep.attractors.starts import Grid, axes_of, grid_of
+from hybrid.sweep.extra import load_xarray
 from hybrid.sweep.local import cores
 from hybrid.sweep.sheet import flags
 from hybrid.sweep.sweep import sweep
@@ -85,7 +87,7 @@ def basins(
         the mode that the call or the system names: it lies beyond a guard of each. The attribute
         ``violated_modes`` names these. ``steps`` is the number of points until the decision. With the
         attractors over the axis ``attractor``, as ``Attractors.to_xarray`` gives them, and their share of the
-        grid, ``fraction``.
+        grid, ``fraction``; after Ctrl-C, of the lines that are complete.
 
     Raises
     ------
@@ -101,6 +103,8 @@ def basins(
     >>> found.label.values.tolist()
     [[1, 1], [1, 1], [1, 1], [1, 1], [1, 1], [-1, -1]]
     """
+    load_xarray()
+
     axes = axes_of(system, over, RESERVED)
     shown = as_flag(progress)
     grid = grid_of(system, axes)
@@ -215,7 +219,8 @@ def _dataset(setup: Setup, grid: Grid, search: Search, rows: np.ndarray, status:
     made["label"] = (dims, label.reshape(shape), {f"meaning of {key}": text for key, text in told.items()})
     made["steps"] = (dims, rows[:, POINTS].reshape(shape))
     made["status"] = (dims, code.reshape(shape).astype(np.int16), flags())
-    shares = [float(np.mean(label == i)) for i in range(1, len(found) + 1)]
+    run = rows[:, CODE] != StatusCode.NOT_RUN
+    shares = [float(np.sum(label == i)) / max(1, int(run.sum())) for i in range(1, len(found) + 1)]
     made["fraction"] = ("attractor", np.array(shares))
     for axis in grid.axes:
         made = made.assign_coords(

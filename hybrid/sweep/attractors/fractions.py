@@ -10,9 +10,10 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
-from hybrid.simulation.interrupt import CTRL_C, interrupted_status
+from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
@@ -23,6 +24,7 @@ from hybrid.sweep.attractors.search import Search
 from hybrid.sweep.attractors.setup import Setup, digest, setup_of
 from hybrid.sweep.attractors.starts import axes_of, sample_of
 from hybrid.sweep.attractors.text import read, written
+from hybrid.sweep.extra import load_xarray
 from hybrid.sweep.sweep import sweep
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem
@@ -33,6 +35,8 @@ from hybrid.transform.aged import original_of, with_age
 if TYPE_CHECKING:
     import xarray
 
+# Random starts that are decided together: an interrupt loses those of one batch.
+BATCH = 512
 WANTED = 'be None, or map one parameter to its values, as {"w": np.linspace(0.8, 1.2, 41)}'
 
 
@@ -60,7 +64,8 @@ def basin_fractions(
     r"""Shares of random starts that lead to each attractor, with standard errors; also over a parameter.
 
     A share :math:`f` of :math:`N` independent starts has the standard error
-    :math:`\sqrt{f (1 - f) / N}`.
+    :math:`\sqrt{f (1 - f) / N}`. After Ctrl-C the shares are those of the starts that were decided until
+    then, which are a random sample too, and the message says how many they are.
 
     Over a parameter, each value has a search of its own, with the same starts. Attractors are then followed
     from value to value by their own points: the attractor to which a run from a point of the old one leads
@@ -103,6 +108,8 @@ def basin_fractions(
     >>> float(shares.fraction.sel(label=1))
     1.0
     """
+    load_xarray()
+
     axes = axes_of(system, over)
     count = arguments.count("starts", starts, 1)
     origins = with_age(system, sample_of(system, axes, count, arguments.count("seed", seed, 0)))
@@ -126,8 +133,9 @@ def basin_fractions(
         with CTRL_C:
             found = task({})
             stopped = CTRL_C.is_set()
-        status = interrupted_status("the starts that were decided") if stopped else found["status"]
-        alone = read(found["found"])
+        alone, status = read(found["found"]), found["status"]
+        if stopped:
+            status = interrupted_status(f"the shares of the first {alone['starts']} of {count} random starts")
         alone["labels"] = list(range(1, len(alone["found"]) + 1))
         return _dataset(setup, [alone], None, None, status)
     swept = sweep(task, {name: values}, store=store, executor=executor, progress=shown)
@@ -152,7 +160,7 @@ def _along(
     system.parameter_values(parameters)
     if name in named("parameters", parameters):
         raise ArgumentError(f"along: Parameter {name!r} is given twice: in along and in parameters.")
-    values = arguments.numbers(f"along[{name!r}]", getattr(value, "values", value), "be values in order")
+    values = arguments.numbers(f"along[{name!r}]", value, "be values in order")
     if values.ndim != 1 or not values.size or not np.isfinite(values).all():
         raise arguments.refusal(f"along[{name!r}]", "be finite values of shape (N,)", value)
     return name, values
@@ -179,7 +187,13 @@ class FractionsAt:
         """Attractors with their shares as text, and a status."""
         search = self.search(point)
         search.pilot(self.origins)
-        rows = search.decided(self.origins)
+        rows = np.zeros((0, 4), dtype=np.int64)
+        for begin in range(0, len(self.origins), BATCH):
+            batch = search.decided(self.origins[begin : begin + BATCH])
+            # A batch that was interrupted holds the starts that are decided soon: it is no fair sample.
+            if CTRL_C.is_set():
+                break
+            rows = np.vstack([rows, batch])
         counts = [int(np.sum(rows[:, OWNER] == i)) for i in range(len(search.found))]
         beyond = int(np.sum(rows[:, CODE] == codes.REFUSED))
         text = written(search, counts, beyond, len(rows))
@@ -220,9 +234,10 @@ def _dataset(
         if each is None:
             continue
         counts = dict(zip(each["labels"], each["counts"], strict=True)) | {-1: each["beyond"]}
-        counts[0] = each["starts"] - sum(counts.values())
-        fraction[i] = [counts.get(int(label), 0) / each["starts"] for label in labels]
-        error[i] = np.sqrt(fraction[i] * (1 - fraction[i]) / each["starts"])
+        if each["starts"]:
+            counts[0] = each["starts"] - sum(counts.values())
+            fraction[i] = [counts.get(int(label), 0) / each["starts"] for label in labels]
+            error[i] = np.sqrt(fraction[i] * (1 - fraction[i]) / each["starts"])
         for label, one in zip(each["labels"], each["found"], strict=True):
             place = i, label + 1
             kind[place], rounds[place], jumps[place] = (

@@ -10,11 +10,12 @@ import numpy as np
 
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.compiler.compiled import compile_system
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import Progress, silent
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import attractors as kernel_types
 from hybrid.kernels.types import codes
-from hybrid.simulation.interrupt import CTRL_C, Bursts
+from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.memory import starts_of
 from hybrid.simulation.plan import plan_of
 from hybrid.simulation.trajectory import Trajectory

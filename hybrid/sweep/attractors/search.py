@@ -8,10 +8,10 @@ from typing import Any
 import attrs
 import numpy as np
 
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import Progress
 from hybrid.kernels.types import attractors as kernel_types
 from hybrid.kernels.types import codes
-from hybrid.simulation.interrupt import CTRL_C
 from hybrid.status import StatusCode
 from hybrid.sweep.attractors.attractor import KINDS, Attractor
 from hybrid.sweep.attractors.find import MOST_POINTS, Found, extended, find
@@ -59,25 +59,28 @@ class Search:
         found[:, OWNER], found[:, CODE] = NONE, StatusCode.NOT_RUN
         most, vain, skipped, tried = self.setup.periods, 0, 0, bool(self.found)
         limit = min(FIRST_POINTS, most)
-        while len(left) and not CTRL_C.is_set():
-            # Nothing can be decided before an attractor is known.
-            points = limit if tried else 0
-            found[left] = runs_of(self.setup).settle(origins[left], self.known(), points, self.threads, bar)
-            # The bar counts each start once.
-            bar = None
-            left = left[_undecided(found)[left]]
-            grown, tried = False, True
-            while not grown and skipped < len(left) and vain < PATIENCE and not CTRL_C.is_set():
-                seed = left[skipped]
-                grown = self.explore(origins[seed], int(found[seed, MODE]))
-                if not grown and limit < most:
-                    break
-                vain = 0 if grown else vain + 1
-                skipped += 0 if grown else 1
-            if not grown:
-                if limit == most:
-                    break
-                limit, vain = min(2 * limit, most), 0
+        with CTRL_C.ending():
+            while len(left) and not CTRL_C.is_set():
+                # Nothing can be decided before an attractor is known.
+                points = limit if tried else 0
+                found[left] = runs_of(self.setup).settle(
+                    origins[left], self.known(), points, self.threads, bar
+                )
+                # The bar counts each start once.
+                bar = None
+                left = left[_undecided(found)[left]]
+                grown, tried = False, True
+                while not grown and skipped < len(left) and vain < PATIENCE and not CTRL_C.is_set():
+                    seed = left[skipped]
+                    grown = self.explore(origins[seed], int(found[seed, MODE]))
+                    if not grown and limit < most:
+                        break
+                    vain = 0 if grown else vain + 1
+                    skipped += 0 if grown else 1
+                if not grown:
+                    if limit == most:
+                        break
+                    limit, vain = min(2 * limit, most), 0
         return found
 
     def explore(self, x0: np.ndarray, mode: int) -> bool:

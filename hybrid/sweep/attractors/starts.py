@@ -93,7 +93,7 @@ def axes_of(system: HybridSystem, over: object, reserved: tuple[str, ...] = ()) 
 
 def _axis(name: str, key: object, value: object) -> Axis:
     what = f"over[{key!r}]"
-    values = arguments.numbers(what, getattr(value, "values", value), EACH)
+    values = arguments.numbers(what, value, EACH)
     if values.ndim > 1 or not values.size:
         raise ArgumentError(f"{what} must {EACH}; got shape {values.shape}.")
     if not np.isfinite(values).all():

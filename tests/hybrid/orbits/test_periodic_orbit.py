@@ -7,7 +7,7 @@ import pytest
 
 import hybrid
 import models
-from hybrid import HybridSystem, Mode, StatusCode, periodic_orbit, simulate
+from hybrid import Every, HybridSystem, Mode, StatusCode, Transition, periodic_orbit, simulate
 from models import bouncing_ball, buck_converter, impact_oscillator, vibroimpact
 from models.one_impact import one_impact_orbits
 from tests.cases import systems
@@ -422,3 +422,22 @@ def test_the_time_at_the_guess_does_not_matter_to_an_autonomous_orbit(t0):
     np.testing.assert_allclose(np.sort(np.abs(orbit.multipliers)), (np.exp(-1), 1.0), rtol=1e-9)
     assert t0 <= orbit.t0 <= t0 + 2.1
     assert orbit.arc()(orbit.t0 + 0.3).shape == (2,)
+
+
+def test_a_search_from_the_mode_of_another_time_asks_for_the_mode():
+    """The switch is on until 0.4 of each period: an orbit that starts at 0.5 is in the mode "off" there."""
+    field = {"on": lambda t, x, p: (1.0 - x.i,), "off": lambda t, x, p: (-x.i,)}
+    coil = HybridSystem(
+        state=("i",),
+        period=1.0,
+        modes=[Mode(name, each) for name, each in field.items()],
+        transitions=[Transition("on", "off", Every(1.0, offset=0.4)), Transition("off", "on", Every(1.0))],
+    )
+    right = periodic_orbit(coil, (0.3,), mode="off", t0=0.5)
+    assert right.status.ok
+    assert right.multipliers[0] == pytest.approx(np.exp(-1.0))
+    wrong = periodic_orbit(coil, (0.3,), mode="on", t0=0.5)
+    assert wrong.status.code == StatusCode.NOT_CONVERGED
+    assert "the orbit ends in mode 'off' and starts in 'on'" in wrong.status.message
+    assert "name it with mode=" in wrong.status.remedy
+    assert "max_iterations" not in wrong.status.remedy

@@ -48,7 +48,7 @@ def test_a_sweep_over_one_axis_is_a_line():
     np.testing.assert_array_equal(line.get_ydata(), np.arange(5.0))
     assert line.get_markersize() >= 1.0
     assert bad.get_xdata().tolist() == [2.0]
-    assert "failed" in axes[0].get_legend().get_texts()[0].get_text()
+    assert "FAILED" in axes[0].get_legend().get_texts()[0].get_text()
 
 
 def test_a_sweep_over_two_axes_is_a_map():
@@ -113,7 +113,7 @@ def test_the_ends_of_many_runs_have_units_modes_and_failures():
     np.testing.assert_array_equal(first.get_offsets(), [[1.0, 0.0], [5.0, 4.0]])
     np.testing.assert_array_equal(second.get_offsets(), [[3.0, 2.0]])
     np.testing.assert_array_equal(failed.get_offsets(), [[7.0, 6.0]])
-    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["a", "b", "failed, see .message"]
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["a", "b", "MAX_STEPS, see .message"]
 
 
 def test_limits_of_chatter_are_arrows_with_names():

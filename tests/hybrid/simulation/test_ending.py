@@ -17,6 +17,7 @@ from hybrid import (
     Taylor,
     Transition,
     Tsit5,
+    from_equations,
     simulate,
 )
 
@@ -174,3 +175,22 @@ def test_a_contact_that_is_left_with_a_speed_has_a_certain_time():
     arc = simulate(system, (-1.0, 0.0), (0.0, 20.0), solver=DOP853(), mode="contact")
     assert arc.status.code == StatusCode.TERMINAL
     assert "not known" not in arc.status.message
+
+
+def test_a_chatter_of_plain_equations_asks_for_no_transition_that_nobody_has_written():
+    """A block with dry friction in a groove comes to rest at its bottom, where two surfaces meet."""
+    block = from_equations(
+        lambda t, x, p: (x.v, -p.g * np.sign(x.q) - p.F * np.sign(x.v)),
+        state=("q", "v"),
+        parameters={"g": 2.0, "F": 0.5},
+    )
+    q, rest, (g, F) = 1.0, 0.0, (2.0, 0.5)
+    for _ in range(200):
+        v = np.sqrt(2 * q * (g - F))
+        rest += np.sqrt(2 * q / (g - F)) + v / (g + F)
+        q = v * v / 2 / (g + F)
+    arc = simulate(block, (1.0, 0.0), (0.0, 10.0))
+    assert arc.status.code == StatusCode.ACCUMULATION
+    assert arc.t[-1] == pytest.approx(rest)
+    assert "accumulates_to" not in str(arc.status)
+    assert "switches in the equations" in arc.status.remedy

@@ -14,8 +14,8 @@ import hybrid
 import lyapunov
 import models
 from hybrid import StatusCode
+from hybrid.compiler.interrupts import CTRL_C, CtrlC
 from hybrid.simulation import interrupt
-from hybrid.simulation.interrupt import CTRL_C, CtrlC
 from lyapunov.two_orbit import INTERVALS_AT_ONCE
 
 RISING = hybrid.Guard(lambda t, x, p: x.v, +1)

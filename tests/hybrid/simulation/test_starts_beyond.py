@@ -1,8 +1,11 @@
 """Runs that start beyond a guard of their mode."""
 
+import numpy as np
 import pytest
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition, simulate
+import hybrid
+import lyapunov
+from hybrid import Guard, HybridSystem, Mode, Reset, StatusCode, Transition, simulate
 
 
 def test_the_only_mode_needs_no_name():
@@ -84,3 +87,68 @@ def test_a_reset_that_takes_the_start_back_leaves_the_next_guard_alone():
     arc = simulate(system, (2.0,), (0.0, 1.0))
     assert arc.status.ok
     assert len(arc.jumps) == 1
+
+
+def relay(**options):
+    """A heater that switches off at the temperature 1 and on at 0; on, it tends to ``p.hot``."""
+    return HybridSystem(
+        state=("T",),
+        parameters={"hot": 2.0},
+        modes=[Mode("on", lambda t, x, p: (p.hot - x.T,)), Mode("off", lambda t, x, p: (-1.0 - x.T,))],
+        transitions=[
+            Transition("on", "off", Guard(lambda t, x, p: x.T - 1.0, +1), name="switch off"),
+            Transition("off", "on", Guard(lambda t, x, p: x.T, -1), name="switch on"),
+        ],
+        **options,
+    )
+
+
+def test_a_guard_beyond_which_a_run_starts_and_that_never_fires_is_a_status():
+    arc = simulate(relay(), (1.5,), (0.0, 5.0), mode="on")
+    assert arc.x[-1, 0] == pytest.approx(2.0 - 0.5 * np.exp(-5.0))
+    assert arc.status.code == StatusCode.START_BEYOND
+    assert "The start lies beyond the guard of 'switch off'" in arc.status.message
+
+
+@pytest.mark.parametrize(("start", "mode"), [(0.5, "on"), (0.5, "off"), (1.5, None), (1.5, "off")])
+def test_a_start_before_its_guards_is_no_such_status(start, mode):
+    arc = simulate(relay(), (start,), (0.0, 5.0), mode=mode)
+    assert arc.status.ok
+    assert len(arc.jumps) > 0
+
+
+def test_a_start_beyond_a_guard_that_fires_later_is_told_in_a_note():
+    swinging = HybridSystem(
+        state=("q", "v"),
+        modes=[Mode("m", lambda t, x, p: (x.v, -x.q))],
+        transitions=[
+            Transition(
+                "m", "m", Guard(lambda t, x, p: x.q - 0.5, +1), Reset(lambda t, x, p: (0.5, x.v)), name="up"
+            )
+        ],
+    )
+    early, late = (simulate(swinging, (1.0, 0.0), (0.0, end)) for end in (3.0, 6.0))
+    assert early.status.code == StatusCode.START_BEYOND
+    assert late.status.ok
+    assert late.jumps.t == pytest.approx([2.0 * np.pi - np.pi / 3.0])
+    assert "The start lies beyond the guard of 'up'" in late.status.message
+
+
+def test_all_results_from_such_a_start_say_so():
+    many = hybrid.simulate_many(relay(), [[0.5], [1.5]], (0.0, 5.0), mode="on")
+    assert many.status.values.tolist() == [StatusCode.SUCCESS, StatusCode.START_BEYOND]
+    assert lyapunov.lyapunov_spectrum(relay(), (1.5,), mode="on", interval=1.0, intervals=5).status.code == (
+        StatusCode.START_BEYOND
+    )
+    chart = lyapunov.chart(
+        relay(), {"hot": [1.2, 2.0], "T": [0.5, 1.5]}, (0.0,), mode="on", interval=1.0, intervals=5
+    )
+    assert (chart.status.values == [[StatusCode.SUCCESS, StatusCode.START_BEYOND]] * 2).all()
+    assert "lies beyond the guard of 'switch off'" in str(chart.message.values[0, 1])
+
+
+def test_the_picture_of_a_chart_names_the_status():
+    chart = lyapunov.chart(relay(), {"T": [0.5, 0.7, 1.5]}, (0.0,), mode="on", interval=1.0, intervals=5)
+    (ax,) = hybrid.plot.plot(chart)
+    assert [text.get_text() for text in ax.get_legend().get_texts()][-1] == "START_BEYOND, see chart.message"
+    assert ax.lines[-1].get_xdata().tolist() == [1.5]

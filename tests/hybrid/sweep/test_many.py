@@ -81,7 +81,7 @@ def test_runs_that_end_early_say_so():
     starts = np.array([[1.0, 0.0], [5.0, 0.0], [-1.0, 0.0], [200.0, 0.0]])
     found = simulate_many(ball, starts, (0.0, 9.0), max_jumps=5)
     assert found.status.values[:2].tolist() == [StatusCode.MAX_JUMPS, StatusCode.MAX_JUMPS]
-    assert found.status.values[2:].tolist() == [StatusCode.SUCCESS, StatusCode.SUCCESS]
+    assert found.status.values[2:].tolist() == [StatusCode.START_BEYOND, StatusCode.SUCCESS]
     assert "lies beyond the guard of 'bounce'" in found.message.values[2]
     assert_one_by_one(found[{"start": [0, 1]}], ball, starts[:2], (0.0, 9.0), max_jumps=5)
     named = simulate_many(ball, starts[2:3], (0.0, 1.0), mode="flight")
@@ -104,7 +104,7 @@ def test_each_thread_tells_of_its_own_starts():
                 np.testing.assert_array_equal(
                     found[name].values, np.concatenate([one[name].values for one in each])
                 )
-            wanted = {1.0: StatusCode.MAX_JUMPS, -1.0: StatusCode.SUCCESS, 200.0: StatusCode.SUCCESS}
+            wanted = {1.0: StatusCode.MAX_JUMPS, -1.0: StatusCode.START_BEYOND, 200.0: StatusCode.SUCCESS}
             if not options:
                 assert found.status.values.tolist() == [wanted[q] for q, _ in starts]
 

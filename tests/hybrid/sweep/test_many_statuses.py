@@ -135,12 +135,15 @@ DRAINED = "may be off by 0.6"
 BEYOND = "The start lies beyond the guard of"
 CASES = {
     "plain": Case(ball(), (1.0, 0.0), 0.1, StatusCode.SUCCESS, "Reached the end."),
-    "beyond": Case(ball(), (-1.0, 0.0), 0.1, StatusCode.SUCCESS, BEYOND, {"mode": "flight"}),
+    "beyond": Case(ball(), (-1.0, 0.0), 0.1, StatusCode.START_BEYOND, BEYOND, {"mode": "flight"}),
+    "beyond, and crossed later": Case(
+        ball(), (-1.0, 6.0), 1.5, StatusCode.SUCCESS, BEYOND, {"mode": "flight"}
+    ),
     "beyond, in a mode with a root": Case(
         tank(0.5, "empty", lambda t, x, p: (-np.sqrt(np.abs(x.h)),)),
         (-1.0,),
         0.1,
-        StatusCode.SUCCESS,
+        StatusCode.START_BEYOND,
         BEYOND,
         {"mode": "drain"},
     ),

@@ -432,5 +432,22 @@ def test_a_copy_of_the_zarr_group_alone_is_read_or_said_to_be_damaged(tmp_path):
     shutil.rmtree(tmp_path / "s" / store.INSIDE)
     assert (hybrid.open_store(tmp_path / "s").y == wanted.y)[:2].all()
     next(each for each in (tmp_path / "s/y/c").rglob("0") if each.is_file()).write_bytes(b"nothing")
-    with pytest.raises(HybridError, match=r"the zarr group .* is damaged"):
+    with pytest.raises(HybridError, match=r"the variable 'y' of the folder .* cannot be read"):
         hybrid.open_store(tmp_path / "s")
+
+
+def test_a_copy_of_the_zarr_group_without_a_chunk_is_refused(tmp_path):
+    sweep(task, GRID, store=tmp_path / "s", executor=1)
+    shutil.rmtree(tmp_path / "s" / store.INSIDE)
+    next(each for each in (tmp_path / "s/y/c").rglob("0") if each.is_file()).unlink()
+    with pytest.raises(HybridError, match=r"path .* is not what was saved: 'y' is damaged or changed"):
+        hybrid.open_store(tmp_path / "s")
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.7, 0.95])
+def test_a_file_that_is_cut_short_is_named(tmp_path, share):
+    sweep(task, GRID, executor=1).to_netcdf(tmp_path / "s.nc")
+    whole = (tmp_path / "s.nc").read_bytes()
+    (tmp_path / "s.nc").write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(HybridError, match=r"the (variable '\w+' of the )?file .*s\.nc' cannot be read"):
+        hybrid.open_store(tmp_path / "s.nc")

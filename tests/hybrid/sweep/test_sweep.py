@@ -246,3 +246,48 @@ def test_bad_points(over, message):
 def test_bad_executors(executor):
     with pytest.raises(ArgumentError, match="executor must be"):
         sweep(product, GRID, executor=executor)
+
+
+def test_a_task_that_calls_nothing_of_the_library_is_given_up_after_ctrl_c():
+    """The task waits until the sweep has returned: with the point in hand, the sweep would never end."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    returned, begun = threading.Event(), threading.Event()
+
+    def task(point):
+        if point["a"] > 0.0:
+            begun.set()
+            returned.wait(60.0)
+        return {"twice": 2.0 * point["a"]}
+
+    def press():
+        begun.wait(60.0)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    try:
+        threading.Thread(target=press).start()
+        found = hybrid.sweep(task, {"a": [0.0, 1.0, 2.0]}, executor=1)
+    finally:
+        returned.set()
+        signal.signal(signal.SIGINT, before)
+    assert found.status.values.tolist() == [StatusCode.SUCCESS, StatusCode.NOT_RUN, StatusCode.NOT_RUN]
+    assert found.twice.values[0] == 0.0
+
+
+def test_a_task_of_many_runs_ends_at_its_next_run_after_ctrl_c():
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    ended, ball = threading.Event(), models.bouncing_ball()
+
+    def task(point):
+        try:
+            os.kill(os.getpid(), signal.SIGINT)
+            for _ in range(10**9):
+                hybrid.simulate(ball, (1.0, 0.0), (0.0, 1.0))
+        finally:
+            ended.set()
+
+    try:
+        found = hybrid.sweep(task, {"a": [0.0, 1.0]}, executor=1)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert (found.status == StatusCode.NOT_RUN).all()
+    assert ended.wait(60.0)

@@ -362,23 +362,6 @@ class TestScaling:
         np.testing.assert_allclose(products, exact, rtol=1e-7)
 
 
-@pytest.mark.filterwarnings("ignore")  # of zarr, about texts
-def test_a_branch_is_saved_and_opened_again(impacts, tmp_path):
-    pytest.importorskip("zarr")
-    impacts.to_xarray().to_zarr(tmp_path / "branch")
-    again = hybrid.open_branch(impacts.system, tmp_path / "branch")
-    np.testing.assert_array_equal(again.parameter, impacts.parameter)
-    np.testing.assert_array_equal(again.multipliers, impacts.multipliers)
-    assert [str(each) for each in again.bifurcations] == [str(each) for each in impacts.bifurcations]
-    i = len(again) // 2
-    assert again.orbit(i).transitions == impacts.orbit(i).transitions
-    np.testing.assert_allclose(again.orbit(i).fundamental, impacts.orbit(i).fundamental, rtol=1e-6)
-    further = continue_orbit(again.orbit(i), "w", (1.5, 1.9))
-    assert further.status.ok
-    with pytest.raises(ArgumentError, match="saved must be the dataset of a branch"):
-        hybrid.open_branch(impacts.system, impacts.to_xarray().drop_attrs())
-
-
 def test_a_picture_over_a_chart(impacts):
     chart = lyapunov.chart(models.impact_oscillator(), {"w": [0.9, 1.0]}, (0.0, 0.0), intervals=5, section=3)
     ax = hybrid.plot.plot_branch(impacts, "v", over=chart)
