@@ -164,7 +164,7 @@ CASES = {
         tank(0.9, "empty"), (1.0,), 20.0, StatusCode.INFINITE_SLOPE, DRAINED, {"mode": "drain"}
     ),
     "sampled": Case(SWING, (1.5, 0.0), 5.0, StatusCode.SUCCESS, "'mark' are not proved"),
-    "not proved": Case(NEAR_ZERO, (1.0,), 40.0, StatusCode.SUCCESS, "crossings of the guard of"),
+    "not proved": Case(NEAR_ZERO, (1.0,), 40.0, StatusCode.SUCCESS, "Not all crossings of 'm->m' are proved"),
     "not resolved": Case(
         PULSE,
         (1.0,),
