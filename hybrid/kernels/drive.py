@@ -378,7 +378,7 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         fired = run.pending
         if span > remaining or (span >= remaining and fired == NO_TRANSITION):
             set_clock(run, stop_cycle, stop_phase)
-        elif span >= room and (fired == NO_TRANSITION or room == until):
+        elif span >= room and (fired == NO_TRANSITION or room == until < remaining):
             # A crossing that rounding puts at the tick or behind it does not pass the tick.
             meet(task, clock, knot, room < until)
         if fired != NO_TRANSITION:

@@ -127,6 +127,43 @@ def test_an_order_that_is_meant_is_not_told():
     assert orbit.status.ok
 
 
+def two_edges(**parameters):
+    """An autonomous loop, whose reference is a state of its own."""
+
+    def pump(name, c):
+        return Mode(name, lambda t, x, p: (1.0, 1.0 + x.v + c * p.I * p.R, c * p.I - p.a * x.v))
+
+    ticks, edge = Guard(lambda t, x, p: x.r - 1.0, +1), Guard(lambda t, x, p: x.ph - 1.0, +1)
+    restart, back = Reset(lambda t, x, p: {"r": x.r - 1.0}), Reset(lambda t, x, p: {"ph": x.ph - 1.0})
+    return HybridSystem(
+        state=("r", "ph", "v"),
+        parameters={"I": 0.5, "a": 1.0, "R": 0.0} | parameters,
+        modes=[pump("idle", 0.0), pump("up", 1.0), pump("down", -1.0)],
+        transitions=[
+            Transition("idle", "up", ticks, restart, name="reference"),
+            Transition("idle", "down", edge, back, name="edge"),
+            Transition("up", "idle", edge, back, name="late edge"),
+            Transition("down", "idle", ticks, restart, name="late reference"),
+        ],
+        start="idle",
+    )
+
+
+@pytest.mark.parametrize("guess", [(0.3, 0.3, 0.0), (0.31, 0.3, 0.01), (0.7, 0.7, 0.0)])
+def test_an_autonomous_lock_has_the_multipliers_of_the_closed_loop(guess):
+    orbit = periodic_orbit(two_edges(), guess, period=1.0)
+    assert orbit.status.ok
+    assert_same(orbit.multipliers, [1.0, *np.linalg.eigvals(IDLE @ [[1.0, 0.0], [-0.5, 1.0]])])
+    assert_is_a_start(orbit)
+
+
+def test_an_autonomous_lock_that_is_a_border_says_so():
+    orbit = periodic_orbit(two_edges(I=0.3, R=2.0, a=0.0), (0.3, 0.3, 0.0), period=1.0)
+    assert orbit.status.code == StatusCode.AMBIGUOUS_ORDER
+    assert_same(orbit.multipliers, [1.0, *sides_of_direct(0.3)[orbit.transitions[0]]])
+    assert_is_a_start(orbit)
+
+
 @pytest.mark.parametrize("t0", [0.0, 0.4, 3.0])
 def test_two_clocks_that_tick_together_have_one_order(t0):
     """``u`` becomes ``2 u`` and then ``u - 1``, at each tick of both, and decays."""

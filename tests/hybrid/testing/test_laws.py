@@ -15,6 +15,7 @@ from hybrid import (
     Reset,
     Transition,
     from_equations,
+    simulate,
 )
 from hybrid.testing import Case, PropertyError, cases, check_laws, check_system
 
@@ -258,6 +259,52 @@ def test_starts_on_a_curved_surface():
     )
     report = check_system(system, examples=10, t_span=(0.0, 2.0))
     assert all(each.examples >= 5 for each in report.properties if "is zero" in each.name)
+
+
+@pytest.mark.parametrize("reset", [None, Reset(lambda t, x, p: {"energy": x.energy + 0.2})])
+def test_a_rise_after_a_fall_is_no_dissipation(reset):
+    """On the way or at a jump, and although the energy stays below where it began."""
+    pace = 0.1 if reset is None else -0.1
+    system = HybridSystem(
+        state=("energy",),
+        modes=[Mode("fall", lambda t, x, p: (-1.0,)), Mode("on", lambda t, x, p: (pace,))],
+        transitions=[Transition("fall", "on", Guard(lambda t, x, p: x.energy - 0.4, -1), reset, name="turn")],
+        laws=Laws(dissipated={"energy": lambda t, x, p: x.energy}),
+    )
+    check_laws(Case(system, system.parameters, "fall", (1.0,), 0.0, 0.5))
+    where = "field of mode 'on'" if reset is None else "reset of 'turn'"
+    with pytest.raises(PropertyError, match=f"(?s)'energy' never grows.*{where}"):
+        check_laws(Case(system, system.parameters, "fall", (1.0,), 0.0, 1.2))
+
+
+def test_the_limit_of_a_chatter_is_no_jump_of_a_law():
+    """Each bounce is counted and has its distance from the one before; the limit is no bounce."""
+    system = HybridSystem(
+        state=("q", "v"),
+        counters=("bounces",),
+        modes=[Mode("flight", lambda t, x, p: (x.v, -1.0)), Mode("rest", lambda t, x, p: (0.0, 0.0))],
+        transitions=[
+            Transition(
+                "flight",
+                "flight",
+                Guard(lambda t, x, p: x.q, -1),
+                Reset(lambda t, x, p: {"v": -0.5 * x.v, "bounces": x.bounces + 1}),
+                name="bounce",
+                accumulates_to="rest",
+            )
+        ],
+        laws=Laws(
+            across={
+                "bounce": {
+                    "counts": lambda t, minus, plus, p: plus.bounces - minus.bounces - 1.0,
+                    "bounces up": lambda t, minus, plus, p: plus.v > 0.0,
+                }
+            }
+        ),
+    )
+    case = Case(system, system.parameters, "flight", (1.0, 0.0, 0), 0.0, 6.0)
+    assert "limit" in simulate(system, (1.0, 0.0, 0), (0.0, 6.0), mode="flight").jumps.kind
+    check_laws(case)
 
 
 def test_a_mode_that_lasts_no_time_need_not_keep_its_laws():
