@@ -39,11 +39,11 @@ class Mirror:
         }
         if not any(one.guard.direction == sign * other.guard.direction for sign in directions):
             return False
-        conditions = one.guard.when, other.guard.when
-        if None in conditions:
-            alike = conditions == (None, None)
+        asks, also_asks = one.guard.when, other.guard.when
+        if asks is None or also_asks is None:
+            alike = asks is also_asks
         else:
-            alike = all(self._agree(case, *conditions) for case in places)
+            alike = all(self._agree(case, asks, also_asks) for case in places)
         return alike and all(
             self._equal(case, case.rates_of(one.source), case.rates_of(other.source), self.x)
             for case in places
