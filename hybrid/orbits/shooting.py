@@ -470,8 +470,7 @@ class Shooting:
                 f"errors of the start grow by a factor of {growth:.3g} over the period, so no digit is left"
             )
             return told, START_NEARER
-        largest = np.abs([newton.anchor, shot.point.x, shot.end]).max()
-        if 0.0 < largest <= self.solver.atol:
+        if 0.0 < shot.magnitude.max() <= self.solver.atol:
             told = (
                 f"all states are below the atol of the solver, {self.solver.atol:.3g}, and so not controlled"
             )
