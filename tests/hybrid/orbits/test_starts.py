@@ -156,7 +156,7 @@ def test_orbits_of_a_converter_are_starts_although_a_clock_ticks_at_their_point(
 
 
 def test_a_state_that_is_zero_for_a_time_is_controlled():
-    """A queue at a traffic light: it grows while the light is red, and is empty before the light turns red."""
+    """A queue at a traffic light grows while the light is red, and is empty before it turns red again."""
     light = HybridSystem(
         state=("n",),
         parameters={"arrive": 0.3, "leave": 1.0, "green": 30.0, "T": 60.0},
