@@ -24,7 +24,7 @@ from hybrid.expression.tracing import TraceError, model_symbols, trace
 from hybrid.system.clocks import Clock
 from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
-from hybrid.system.functions import WholeReset, field_function, moving_field
+from hybrid.system.functions import field_function, moving_field
 from hybrid.system.graph import HybridSystem, watched_by
 from hybrid.transform import corners, rests
 from hybrid.transform.cells import Cell, Choice, Pieces
@@ -53,10 +53,7 @@ class Splitter:
         self.symbols = model_symbols(system.dimension, len(system.parameters))
         self.surfaces = Surfaces(self.symbols)
         self.names = Names(self.variables)
-        self.outgoing = [
-            Outgoing(i, each, self._guard(each), self._reset(each))
-            for i, each in enumerate(system.transitions)
-        ]
+        self.outgoing = [Outgoing.of(i, each, self.variables) for i, each in enumerate(system.transitions)]
         self.pieces = [self._pieces(i, mode) for i, mode in enumerate(system.modes)]
         self.known: dict[Cell, tuple[Mode, list[Edge]]] = {}
         self.made: dict[Cell, None] = {}
@@ -204,24 +201,6 @@ class Splitter:
             if each.transition.source == mode.name and each.guard is not None
         ]
         return Pieces(index, field, watched, self.variables, self.surfaces)
-
-    def _guard(self, transition: Transition) -> Expression | None:
-        try:
-            found = trace(
-                transition.guard.function, self.variables.components, self.variables.parameter_names
-            )
-        except TraceError:
-            return None
-        return None if transition.clock else found[0]
-
-    def _reset(self, transition: Transition) -> list[Expression] | None:
-        if transition.reset is None:
-            return [*self.symbols.x]
-        try:
-            reset = WholeReset(transition.reset.function, self.variables.components)
-            return trace(reset, self.variables.components, self.variables.parameter_names)
-        except TraceError:
-            return None
 
     def _mode(self, cell: Cell) -> Mode:
         original = self.original.modes[cell.mode]
