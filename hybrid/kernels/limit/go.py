@@ -29,6 +29,7 @@ from hybrid.kernels.jumps.record import remember_flight, remember_jump
 from hybrid.kernels.jumps.rest import ROUNDED
 from hybrid.kernels.limit.endless import hold_endless, mark_endless, may_be_held
 from hybrid.kernels.limit.impacts import extrapolate_impacts, series_of_impacts
+from hybrid.kernels.limit.meeting import is_close, may_be_mapped, meeting_matrix
 from hybrid.kernels.limit.rounds import (
     FEWEST_JUMPS,
     NO_SERIES,
@@ -282,7 +283,8 @@ def go_to_limit(task, series, transition):
     """Go to the limit ``work.settled`` of a series, whose next jump would be that ``transition``.
 
     The limit is a jump of its own, into the mode that the transition names, if it names one. Its tangent map
-    is known for impacts on one guard. Returns false, and does nothing, if later jumps tell it better.
+    is known for impacts on one guard, and for rounds between two guards that keep the state. Returns false,
+    and does nothing, if later jumps tell it better.
     """
     _, model, method, run, record, work = task_of(task)
     n, tangents, turn, left = model.dimension, task.tangents, series.turn, series.left
@@ -292,11 +294,15 @@ def go_to_limit(task, series, transition):
     target, onward = mode_of_limit(model, run, transition, run.phase + left, work.settled, work)
     if alone and tangents > 0 and not drift_is_known(model, run, transition, left, work):
         return False
+    named = model.accumulates_to[transition] != NO_MODE
+    mapped = tangents > 0 and named and may_be_mapped(model, run, turn)
+    if mapped and left > 0.0 and not is_close(model, run, series, work):
+        return False
     if not may_be_held(model, run, turn, left):
         return False
     if alone:
         limit_matrix(model, method, run, transition, target, left, work)
-    else:
+    elif not (mapped and meeting_matrix(model, run, turn, target, left, work)):
         forget_tangents(task)
     if left > 0.0:
         remember_flight(run, record, n, left, work.settled)
