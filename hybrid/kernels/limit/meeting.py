@@ -2,7 +2,7 @@
 
 The limit lies where two guards meet. On its way there the state moves along the fields ``f_k`` of the modes
 of the round, and after the limit along ``f``, which keeps it on both. So a displacement is taken out along
-the differences ``f_k - f``: ``Xi = I - V (G V)^-1 G``, with the gradients ``G`` of the two guards and two such
+the differences ``f_k - f``: ``Xi = I - V (G V)^-1 G``, with the gradients ``G`` of the guards and two such
 differences in ``V``. If all differences have one direction ``d``, as forces that change a velocity have, the
 other one is that of the motion that it brings, ``D_x f d``.
 """
