@@ -104,9 +104,9 @@ NAME_THE_LIMIT = (
 REST_OF_EQUATIONS = (
     "These transitions come from switches in the equations, such as np.sign, and no mode is derived in which "
     "the run goes on where the surfaces of the switches meet. Either the motion there is not unique, because "
-    "the fields around the meeting differ in more than one direction, or the surfaces are not those of one "
-    "position and its velocity. To go on from there, write the model as a HybridSystem with a mode for the "
-    "rest."
+    "the fields around the meeting differ in too many directions, or the case is not known: more than two "
+    "surfaces take turns, or the rate of the position is not a constant times the switching velocity. To go "
+    "on from there, write the model as a HybridSystem with a mode for the rest."
 )
 DECLARE_PERIOD = (
     "If the forcing is periodic, declare the period with HybridSystem(period=...): the phase of the forcing "

@@ -17,7 +17,8 @@ from hybrid.expression.operations import Less
 from hybrid.expression.polynomials import is_zero
 from hybrid.expression.tracing import trace
 from hybrid.system.elements import Function
-from hybrid.transform.cells import Cell, Pieces, Sides
+from hybrid.transform.cells import Cell, Pieces
+from hybrid.transform.ties import Sides
 
 # A share of a side above this has come to its end if the speed of leaving the surface vanishes.
 NEARLY = Number(0.99)

@@ -11,8 +11,9 @@ from hybrid.expression.derivatives import jacobian_of
 from hybrid.expression.nodes import ZERO, Expression, Number
 from hybrid.expression.operations import Absolute, Less
 from hybrid.transform import corners
-from hybrid.transform.cells import Cell, Choice, Pieces, Sides
+from hybrid.transform.cells import Cell, Choice, Pieces
 from hybrid.transform.surface import SLIDING_BAND
+from hybrid.transform.ties import Sides
 
 
 def cell_of(pieces: Pieces, cell: Cell, sides: Sides, number: int) -> Cell | None:
@@ -35,15 +36,21 @@ def cell_of(pieces: Pieces, cell: Cell, sides: Sides, number: int) -> Cell | Non
 
 
 def _may_rest(pieces: Pieces, sides: Sides, one: int, other: int) -> bool:
-    """Whether one of two surfaces is tied to the other where they meet, and jumps across it bring it back."""
+    """Whether a chatter between two surfaces may lead to where they meet, and its mode there is known.
+
+    One is tied to the other, and jumps across it bring it back; or the state slides along both, and each
+    changes the speed through the other, so that the state may spiral to where they meet.
+    """
     at = {**sides, one: 0, other: 0}
-    ties = pieces.ties.at(at)
+    if not pieces.ties.are_decided(at):
+        return False
+    ties, free = pieces.ties.at(at), pieces.ties.free(at)
+    apart = corners.are_apart(pieces, at, free)
     tied = next((number for number in (one, other) if number in ties), None)
     if tied is None:
-        return False
-    velocity, free = ties[tied][0], pieces.ties.free(at)
+        return not apart and len(free) == 2 and corners.may_slide(pieces, at)
     jumps = any(pieces.jumps(vertex, tied) for vertex in pieces.ties.vertices(at))
-    return jumps and pieces.may_attract(at, velocity) and corners.are_apart(pieces, at, free)
+    return apart and jumps and pieces.may_attract(at, ties[tied][0])
 
 
 def around(pieces: Pieces, cell: Cell, number: int) -> Iterator[tuple[int, Choice]]:

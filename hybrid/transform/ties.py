@@ -85,10 +85,16 @@ class Ties:
         for signs in product((-2, 2), repeat=len(on)):
             yield self.moved(sides, dict(zip(on, signs, strict=True)))
 
+    def are_decided(self, sides: Sides) -> bool:
+        """Whether all corners around some surfaces decide every switch."""
+        return bool(self._fields(sides))
+
     def _fields(self, sides: Sides) -> list[Sequence[Expression]]:
         """The fields of all corners around some surfaces; none if a corner leaves a switch open."""
         resolved = [self.switches.resolved(corner) for corner in _corners(sides)]
-        fields = [each.entries[: self.size] for each in resolved if isinstance(each, Resolved)]
+        fields: list[Sequence[Expression]] = [
+            each.entries[: self.size] for each in resolved if isinstance(each, Resolved)
+        ]
         return fields if len(fields) == len(resolved) else []
 
     def _leader(

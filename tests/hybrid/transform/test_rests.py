@@ -174,3 +174,37 @@ def test_a_kink_makes_no_mode_of_rest():
         lambda t, x, p: (x.v, -x.q - 0.5 * np.sign(x.v) - 2.0 * np.maximum(x.q, 0)), state=("q", "v")
     )
     assert "q=0, v=0" not in system.mode_names
+
+
+def spiral(drift=lambda t: 0.0):
+    """Four fields that turn about the origin: each quarter takes a third of its distance, leaves a third."""
+    return from_equations(
+        lambda t, x, p: (
+            -np.sign(x.x) + 2.0 * np.sign(x.y) + drift(t),
+            -2.0 * np.sign(x.x) - np.sign(x.y),
+            1.0 + x.x,
+        ),
+        state=("x", "y", "s"),
+    )
+
+
+@SOLVERS
+def test_a_spiral_into_the_intersection_of_two_surfaces_slides_on_along_both(solver):
+    arc = simulate(spiral(), (1.0, 0.0, 0.0), (0.0, 3.0), solver=solver)
+    assert arc.status.ok, arc.status
+    [limit] = [jump for jump in arc.jumps if jump.kind == "limit"]
+    assert limit.t == pytest.approx(0.5, abs=1e-8)
+    assert arc.mode[-1] == "x=0, y=0"
+    # The area under x(t) is four triangles per turn, and each turn is 81 times smaller in x and in time.
+    turn = 1 / 6 - 1 / 162 - 1 / 486 + 1 / 13122
+    assert arc.x[-1] == pytest.approx([0.0, 0.0, 3.0 + turn / (1 - 1 / 81**2)], abs=1e-7)
+
+
+def test_an_intersection_that_a_spiral_has_reached_is_left_when_the_drift_exceeds_what_both_hold():
+    """Shares ``a = c / 5`` and ``b = -2 c / 5`` hold a drift ``c``: up to 2.5."""
+    arc = simulate(spiral(drift=lambda t: t), (0.0, 0.1, 0.0), (0.0, 2.9))
+    assert arc.status.ok, arc.status
+    assert arc.jumps.t[-1] == pytest.approx(2.5, abs=1e-9)
+    assert arc.mode[-1] == "x=0, y<0"
+    # Along x = 0 the rate of y is 5 - 2 t.
+    assert arc.x[-1, 1] == pytest.approx(-0.16, abs=1e-8)

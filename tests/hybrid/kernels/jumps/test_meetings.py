@@ -99,3 +99,19 @@ def test_a_map_that_hangs_on_the_whole_way_is_not_given():
     arc = simulate(system, (1.0, 0.2, 0.0), (0.0, 12.0), tangent=True)
     assert arc.status.code == StatusCode.SINGULAR_SALTATION
     assert np.isnan(arc.fundamental).any()
+
+
+def test_the_tangent_map_of_a_spiral_is_that_of_differences():
+    system = from_equations(
+        lambda t, x, p: (
+            -np.sign(x.x) + 2.0 * np.sign(x.y),
+            -2.0 * np.sign(x.x) - np.sign(x.y),
+            x.x - 0.3 * x.z + 0.5 * np.sign(x.y),
+        ),
+        state=("x", "y", "z"),
+    )
+    start = np.array([1.0, 0.2, 0.3])
+    arc = simulate(system, start, (0.0, 2.0), tangent=True)
+    assert arc.status.ok, arc.status
+    expected = differences(lambda x0: simulate(system, x0, (0.0, 2.0)).x[-1], start)
+    assert arc.fundamental == pytest.approx(expected, abs=1e-7)
