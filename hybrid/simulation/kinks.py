@@ -31,9 +31,10 @@ def move_alike(system: HybridSystem, model: Any, run: Any, modes: list[str]) -> 
     met: set[str | None] = {*modes[:1]}
     for _ in modes:
         for transition, on_guard in zip(system.transitions, run.on_guard, strict=True):
-            inside = transition.source in met and transition.target in modes
-            if inside and transition.target not in met and on_guard == NO_SIDE and start.is_kink(transition):
-                met.add(transition.target)
+            pair = {transition.source, transition.target}
+            joins = pair.issubset(modes) and len(pair & met) == len(pair) - 1
+            if joins and on_guard == NO_SIDE and start.is_kink(transition):
+                met |= pair
     return bool(modes) and met.issuperset(modes)
 
 

@@ -296,7 +296,7 @@ def go_to_limit(task, series, transition):
         return False
     named = model.accumulates_to[transition] != NO_MODE
     mapped = tangents > 0 and named and may_be_mapped(model, run, turn)
-    if mapped and left > 0.0 and not is_close(model, run, series, work):
+    if mapped and left > 0.0 and not is_close(model, method, run, series, work):
         return False
     if not may_be_held(model, run, turn, left):
         return False

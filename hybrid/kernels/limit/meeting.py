@@ -12,6 +12,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.slopes import whole_jacobian
+from hybrid.kernels.events.guards import error_band, guard_acceleration, guard_speed, guard_value
 from hybrid.kernels.jumps.past import fired_before
 from hybrid.kernels.jumps.rest import ROUNDED
 from hybrid.kernels.limit.rounds import RESOLVED, rounding_of_landing
@@ -145,13 +146,26 @@ def may_be_mapped(model, run, turn):
 
 
 @njit(**KERNEL)
-def is_close(model, run, series, work):
-    """Whether rounding begins to hide the rounds, a millionth of the next one: nearer the map is no better.
+def is_close(model, method, run, series, work):
+    """Whether the tolerances hide how far the next round moves a guard, or rounding begins to hide it.
 
-    What the jumps to come do besides is of second order in the time left.
+    What the jumps to come do to tangent vectors besides the map of the meeting fades with the time left.
     """
     landing = rounding_of_landing(model, run, abs(run.phase), work)
-    return landing >= RESOLVED * series.ratio**2 * series.latest
+    if landing >= RESOLVED * series.ratio**2 * series.latest:
+        return True
+    t, x = run.phase, run.y
+    for transition in (fired_before(run, 0), meets_another(model, run, series.turn)):
+        height = abs(guard_value(model, transition, t, x, work.scalar))
+        model.field(run.mode, t, x, model.parameters, work.field)
+        speed = guard_speed(model, transition, t, x, work.field, work.gradient)
+        acceleration = abs(guard_acceleration(model, run, transition, run.mode, t, x, work))
+        if acceleration > 0.0:
+            height += speed**2 / (2.0 * acceleration)
+            model.guard_gradient(transition, t, x, model.parameters, work.gradient)
+            if height * series.ratio**2 <= error_band(method, run, work.gradient, model.controlled):
+                return True
+    return False
 
 
 @njit(**KERNEL)

@@ -66,6 +66,14 @@ def test_a_start_at_the_bottom_is_at_rest():
     assert arc.x[-1] == pytest.approx([0.0, 0.0, 1.0])
 
 
+def test_a_start_where_friction_alone_would_hold_the_block_is_at_rest():
+    """Three modes keep it there, all alike."""
+    system = from_equations(lambda t, x, p: (x.v, -0.5 * np.sign(x.q) - 2.0 * np.sign(x.v)), state=("q", "v"))
+    arc = simulate(system, (0.0, 0.0), (0.0, 1.0))
+    assert arc.status.ok
+    assert arc.x[-1] == pytest.approx([0.0, 0.0])
+
+
 def test_a_block_leaves_its_groove_when_the_push_exceeds_both_forces():
     """The push is ``t - 10`` after t = 10: it exceeds 2.5 at t = 12.5, and what is above 2.5 accelerates."""
     system = twisting(push=lambda t: np.maximum(t - 10.0, 0.0))

@@ -41,8 +41,9 @@ def test_the_tangent_map_is_that_of_differences(name):
     arc = simulate(system, start, (0.0, 12.0), tangent=True)
     assert arc.status.ok, arc.status
     assert any(jump.kind == "limit" for jump in arc.jumps)
+    assert "grazed" not in arc.status.message
     expected = differences(lambda x0: simulate(system, x0, (0.0, 12.0)).x[-1], start)
-    assert arc.fundamental == pytest.approx(expected, abs=1e-7)
+    assert arc.fundamental == pytest.approx(expected, abs=1e-6)
     assert np.all(arc.fundamental[:2] == 0.0)
 
 
