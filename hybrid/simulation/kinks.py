@@ -32,8 +32,10 @@ def move_alike(system: HybridSystem, model: Any, run: Any, modes: list[str]) -> 
     for _ in modes:
         for transition, on_guard in zip(system.transitions, run.on_guard, strict=True):
             pair = {transition.source, transition.target}
-            joins = pair.issubset(modes) and len(pair & met) == len(pair) - 1
-            if joins and on_guard == NO_SIDE and start.is_kink(transition):
+            if on_guard != NO_SIDE or not pair.issubset(modes) or len(pair & met) != len(pair) - 1:
+                continue
+            # The kink may be passed in one direction alone; no transition of the other may change the state.
+            if all(start.is_kink(each) for each in system.transitions if {each.source, each.target} == pair):
                 met |= pair
     return bool(modes) and met.issuperset(modes)
 
