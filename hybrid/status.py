@@ -103,8 +103,10 @@ NAME_THE_LIMIT = (
 # Of equations that have been split: nobody has written a transition that could name a mode.
 REST_OF_EQUATIONS = (
     "These transitions come from switches in the equations, such as np.sign, and no mode is derived in which "
-    "the state rests where the surfaces of the switches meet. To go on from there, write the model as a "
-    "HybridSystem with a mode for the rest."
+    "the run goes on where the surfaces of the switches meet. Either the motion there is not unique, because "
+    "the fields around the meeting differ in too many directions, or the case is not known: more than two "
+    "surfaces take turns, or the rate of the position is not a constant times the switching velocity. To go "
+    "on from there, write the model as a HybridSystem with a mode for the rest."
 )
 DECLARE_PERIOD = (
     "If the forcing is periodic, declare the period with HybridSystem(period=...): the phase of the forcing "

@@ -68,14 +68,16 @@ def _notes(trajectory: Trajectory, code: int) -> list[str]:
 
 
 def _grow(trajectory: Trajectory, code: int) -> None:
-    """Unexplored if the run was ended by a transition into a mode that has not been made yet."""
-    growth, last = trajectory.system.growth, trajectory.run.last_fired
-    if growth is None or code != StatusCode.TERMINAL or last < 0:
+    """Unexplored if a transition or a chatter at the end of the run leads to a mode that is not made yet."""
+    growth, run = trajectory.system.growth, trajectory.run
+    if growth is None or code not in (StatusCode.TERMINAL, StatusCode.ACCUMULATION) or run.last_fired < 0:
         return
-    name = trajectory.system.transition_names[last]
-    if growth.leads_on(name):
-        growth.extend(name)
-        raise Unexplored(name)
+    in_turn = code == StatusCode.ACCUMULATION and not run.at_rest
+    for last in _recent(trajectory, run.round) if in_turn else [run.last_fired]:
+        name = trajectory.system.transition_names[last]
+        if growth.leads_on(name):
+            growth.extend(name)
+            raise Unexplored(name)
 
 
 def _never_fired(trajectory: Trajectory) -> list[str]:

@@ -31,9 +31,12 @@ def move_alike(system: HybridSystem, model: Any, run: Any, modes: list[str]) -> 
     met: set[str | None] = {*modes[:1]}
     for _ in modes:
         for transition, on_guard in zip(system.transitions, run.on_guard, strict=True):
-            inside = transition.source in met and transition.target in modes
-            if inside and transition.target not in met and on_guard == NO_SIDE and start.is_kink(transition):
-                met.add(transition.target)
+            pair = {transition.source, transition.target}
+            if on_guard != NO_SIDE or not pair.issubset(modes) or len(pair & met) != len(pair) - 1:
+                continue
+            # The kink may be passed in one direction alone; no transition of the other may change the state.
+            if all(start.is_kink(each) for each in system.transitions if {each.source, each.target} == pair):
+                met |= pair
     return bool(modes) and met.issuperset(modes)
 
 

@@ -6,7 +6,7 @@ matters there, -1 below, 1 above, and 0 on a surface along which the state slide
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 from typing import Any
 
@@ -27,12 +27,11 @@ from hybrid.transform import additive
 from hybrid.transform.naming import Names
 from hybrid.transform.rounding import combined
 from hybrid.transform.surface import SwitchingSurface
+from hybrid.transform.ties import Sides, Ties
 
 # Two solutions for the shares on an intersection count as one if their relative difference is less than the
 # square root of this number.
 FOLD = 1e-8
-# By number of a surface: -1 below, 1 above, 0 sliding along it; -2 and 2 on it, with the branch of that side.
-Sides = Mapping[int, int]
 
 
 @attrs.frozen
@@ -124,6 +123,8 @@ class Pieces:
         self._between: dict[Any, SwitchingSurface] = {}
         self._shares: dict[Any, Shares | None] = {}
         self._rests: dict[Any, bool] = {}
+        defaults = dict(zip(surfaces.symbols.p, variables.parameters.values(), strict=True))
+        self.ties = Ties(self.switches, self.size, surfaces, defaults)
 
     def cells(self, sides: Sides, decide: Callable[[int], int | None] | None = None) -> Iterator[Choice]:
         """The cells where these sides hold; sides that are missing and matter are chosen both ways.
@@ -186,7 +187,7 @@ class Pieces:
 
     def _entries(self, sides: Sides) -> list[tuple[Expression, ...]]:
         """Every function with the branches of some sides, at each vertex of a sliding cell."""
-        return [tuple(self._resolved(vertex)) for vertex in _vertices(sides)]
+        return [tuple(self._resolved(vertex)) for vertex in self.ties.vertices(sides)]
 
     def _essential(self, sides: dict[int, int]) -> dict[int, int]:
         """The sides that do not follow from the others."""
@@ -199,7 +200,7 @@ class Pieces:
     def _asked(self, sides: Sides) -> dict[int, int] | int:
         """The sides that matter and do not follow from others, -1, 0 or 1; or a surface that is missing."""
         used: dict[int, int] = {}
-        for vertex in _vertices(sides):
+        for vertex in self.ties.vertices(sides):
             result = self.switches.resolved(vertex)
             if isinstance(result, int):
                 return result
@@ -215,7 +216,7 @@ class Pieces:
         return self._fields[key]
 
     def _flow(self, sides: Sides) -> Function:
-        on = [number for number, side in sides.items() if side == 0]
+        on = self.ties.free(sides)
         if not on:
             return expressed(self._vertex_field(sides))
         if len(on) == 1 and self.rests(sides, on[0]):
@@ -229,7 +230,9 @@ class Pieces:
     def _additive_field(self, sides: Sides, on: Sequence[int]) -> list[Expression] | None:
         symbols, known = self.surfaces.symbols, self.surfaces.known
         gradients = jacobian_of([known[number].height for number in on], symbols.variables)
-        return additive.sliding_field(lambda own: self._vertex_field({**sides, **own}), on, gradients)
+        return additive.sliding_field(
+            lambda own: self._vertex_field(self.ties.moved(sides, own)), on, gradients
+        )
 
     def _vertex_field(self, sides: Sides) -> list[Expression]:
         return self._resolved(sides)[: self.size]
@@ -258,7 +261,7 @@ class Pieces:
         key = number, tuple(sorted((k, s) for k, s in sides.items() if k != number))
         if key not in self._between:
             height = scalar(self.surfaces.known[number].height)
-            below, above = (self.flow({**sides, number: side}) for side in (-2, 2))
+            below, above = (self.flow(self.ties.moved(sides, {number: side})) for side in (-2, 2))
             self._between[key] = SwitchingSurface(self.variables, below, above, height)
         return self._between[key]
 
@@ -267,7 +270,7 @@ class Pieces:
 
         What a flow along several surfaces does across them is zero up to rounding, and tells no size.
         """
-        return self.between(next(_vertices(sides, besides=number)), number)
+        return self.between(next(self.ties.vertices(sides, besides=number)), number)
 
     def jumps(self, sides: Sides, number: int) -> bool:
         """Whether the field is not proved to be continuous across a surface, all other sides as given."""
@@ -327,19 +330,20 @@ class Pieces:
 
     def changes(self, sides: Sides, number: int) -> Iterator[list[Expression]]:
         """The change of the field from below a surface to above it, at each vertex of the other sides."""
-        for vertex in _vertices(sides, besides=number):
-            below, above = (self._bare_field({**vertex, number: side}) for side in (-2, 2))
+        for vertex in self.ties.vertices(sides, besides=number):
+            below, above = (self._bare_field(self.ties.moved(vertex, {number: side})) for side in (-2, 2))
             yield [a - b for b, a in zip(below, above, strict=True)]
 
     def _is_additive(self, sides: Sides, one: int, other: int) -> bool:
         """Whether the jumps across two surfaces simply add up."""
-        a, b, c, d = (self._vertex_field({**sides, one: i, other: j}) for i, j in product((-2, 2), repeat=2))
+        corners = (self.ties.moved(sides, {one: i, other: j}) for i, j in product((-2, 2), repeat=2))
+        a, b, c, d = map(self._vertex_field, corners)
         pieces = zip(a, b, c, d, strict=True)
         return all(combined((1, w), (-1, x), (-1, y), (1, z)) == 0 for w, x, y, z in pieces)
 
     def shares(self, sides: Sides) -> Shares | None:
         """The shares of the sides of two surfaces whose jumps do not add up; None on other cells."""
-        on = [number for number, side in sides.items() if side == 0]
+        on = self.ties.free(sides)
         if len(on) != 2:
             return None
         key = tuple(sorted(sides.items()))
@@ -356,7 +360,8 @@ class Pieces:
         """
         symbols = self.surfaces.symbols
         corners = {
-            (i, j): self._vertex_field({**sides, one: i, other: j}) for i, j in product((-2, 2), repeat=2)
+            (i, j): self._vertex_field(self.ties.moved(sides, {one: i, other: j}))
+            for i, j in product((-2, 2), repeat=2)
         }
         field = [_coefficients(*each) for each in zip(*corners.values(), strict=True)]
         speeds = []
@@ -396,10 +401,3 @@ def _coefficients(mm: Expression, mp: Expression, pm: Expression, pp: Expression
     signs = (-1, -1, 1, 1), (-1, 1, -1, 1), (1, -1, -1, 1)
     by_a, by_b, by_both = (combined(*zip(each, (mm, mp, pm, pp), strict=True)) / 4 for each in signs)
     return pp - by_a - by_b - by_both, by_a, by_b, by_both
-
-
-def _vertices(sides: Sides, besides: int | None = None) -> Iterator[dict[int, int]]:
-    """The sides with each zero replaced by both signs, except for one surface."""
-    on = [number for number, side in sides.items() if side == 0 and number != besides]
-    for signs in product((-2, 2), repeat=len(on)):
-        yield {**sides, **dict(zip(on, signs, strict=True))}

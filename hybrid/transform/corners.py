@@ -17,7 +17,8 @@ from hybrid.expression.operations import Less
 from hybrid.expression.polynomials import is_zero
 from hybrid.expression.tracing import trace
 from hybrid.system.elements import Function
-from hybrid.transform.cells import Cell, Pieces, Sides
+from hybrid.transform.cells import Cell, Pieces
+from hybrid.transform.ties import Sides
 
 # A share of a side above this has come to its end if the speed of leaving the surface vanishes.
 NEARLY = Number(0.99)
@@ -84,7 +85,7 @@ def projection(pieces: Pieces, cell: Cell, left: Sequence[int]) -> Function:
 
     def projected(t: Any, x: Any, p: Any) -> Any:
         for number in left:
-            x = pieces.between(dict(cell.branches), number).projection(t, x, p)
+            x = pieces.beside(dict(cell.branches), number).projection(t, x, p)
         return x
 
     return expressed(trace(projected, pieces.variables.components, pieces.variables.parameter_names))
@@ -110,17 +111,17 @@ def are_apart(pieces: Pieces, sides: Sides, on: Sequence[int]) -> bool:
 
 def may_slide(pieces: Pieces, sides: Sides) -> bool:
     """Whether an orbit may slide along all surfaces on which a cell does; False if nowhere."""
-    on = [number for number, side in sides.items() if side == 0]
+    on = pieces.ties.free(sides)
     if not all(pieces.jumps(sides, number) and pieces.may_attract(sides, number) for number in on):
         return False
     if len(on) < 2 or pieces.shares(sides) is not None:
         return True
-    return may_slide(pieces, {**sides, on[-1]: 2}) and not is_zero(attraction(pieces, sides))
+    return may_slide(pieces, pieces.ties.moved(sides, {on[-1]: 2})) and not is_zero(attraction(pieces, sides))
 
 
 def slides(pieces: Pieces, sides: Sides) -> list[Expression]:
     """Expressions that are all positive where an orbit slides along the surfaces on which a cell does."""
-    on = [number for number, side in sides.items() if side == 0]
+    on = pieces.ties.free(sides)
     if not on:
         return []
     shares = pieces.shares(sides)
@@ -142,15 +143,16 @@ def attraction(pieces: Pieces, sides: Sides) -> Expression:
     shares = pieces.shares(sides)
     if shares is not None:
         return shares.unique
-    *rest, last = [number for number, side in sides.items() if side == 0]
+    *rest, last = pieces.ties.free(sides)
     below, above = speeds(pieces, sides, last)
     own = below - above
-    return own * attraction(pieces, {**sides, last: 2}) if rest else own
+    return own * attraction(pieces, pieces.ties.moved(sides, {last: 2})) if rest else own
 
 
 def speeds(pieces: Pieces, sides: Sides, number: int) -> tuple[Expression, Expression]:
     """The rates of a surface's height along the flows below it and above it."""
-    below, above = (rate_of(pieces, number, pieces.flow({**sides, number: side})) for side in (-2, 2))
+    beside = (pieces.ties.moved(sides, {number: side}) for side in (-2, 2))
+    below, above = (rate_of(pieces, number, pieces.flow(each)) for each in beside)
     return below, above
 
 

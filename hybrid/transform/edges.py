@@ -5,7 +5,10 @@ from __future__ import annotations
 import attrs
 
 from hybrid.expression.nodes import Expression
+from hybrid.expression.tracing import TraceError, model_symbols, trace
 from hybrid.system.elements import Transition
+from hybrid.system.functions import WholeReset
+from hybrid.system.variables import Variables
 from hybrid.transform.cells import Cell
 
 
@@ -26,3 +29,27 @@ class Outgoing:
     transition: Transition
     guard: Expression | None
     reset: list[Expression] | None
+
+    @classmethod
+    def of(cls, index: int, transition: Transition, variables: Variables) -> Outgoing:
+        """A transition of a system with these variables."""
+        guard, reset = _guard(transition, variables), _reset(transition, variables)
+        return cls(index, transition, guard, reset)
+
+
+def _guard(transition: Transition, variables: Variables) -> Expression | None:
+    try:
+        found = trace(transition.guard.function, variables.components, variables.parameter_names)
+    except TraceError:
+        return None
+    return None if transition.clock else found[0]
+
+
+def _reset(transition: Transition, variables: Variables) -> list[Expression] | None:
+    if transition.reset is None:
+        return [*model_symbols(variables.dimension, len(variables.parameter_names)).x]
+    try:
+        reset = WholeReset(transition.reset.function, variables.components)
+        return trace(reset, variables.components, variables.parameter_names)
+    except TraceError:
+        return None

@@ -24,9 +24,9 @@ from hybrid.expression.tracing import TraceError, model_symbols, trace
 from hybrid.system.clocks import Clock
 from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
-from hybrid.system.functions import WholeReset, field_function, moving_field
+from hybrid.system.functions import field_function, moving_field
 from hybrid.system.graph import HybridSystem, watched_by
-from hybrid.transform import corners
+from hybrid.transform import corners, rests
 from hybrid.transform.cells import Cell, Choice, Pieces
 from hybrid.transform.edges import Edge, Outgoing
 from hybrid.transform.naming import Names, copy_name
@@ -53,10 +53,7 @@ class Splitter:
         self.symbols = model_symbols(system.dimension, len(system.parameters))
         self.surfaces = Surfaces(self.symbols)
         self.names = Names(self.variables)
-        self.outgoing = [
-            Outgoing(i, each, self._guard(each), self._reset(each))
-            for i, each in enumerate(system.transitions)
-        ]
+        self.outgoing = [Outgoing.of(i, each, self.variables) for i, each in enumerate(system.transitions)]
         self.pieces = [self._pieces(i, mode) for i, mode in enumerate(system.modes)]
         self.known: dict[Cell, tuple[Mode, list[Edge]]] = {}
         self.made: dict[Cell, None] = {}
@@ -84,7 +81,7 @@ class Splitter:
             return self.stage
 
     def leads_on(self, transition: str) -> bool:
-        """Whether a transition leads to a mode that the system lacks."""
+        """Whether a transition, or the limit of its chatter, leads to a mode that the system lacks."""
         return transition in self.frontier
 
     def extend(self, transition: str) -> None:
@@ -139,19 +136,14 @@ class Splitter:
     def _make(self, cells: Sequence[Cell], most: int) -> None:
         """Make these cells, and others that can be reached from them, nearest first."""
         waiting, made = deque(cells), 0
-        wanted = set(cells)
-        while waiting and (made < most or waiting[0] in wanted):
+        while waiting and (made < most or waiting[0] in cells):
             cell = waiting.popleft()
             if cell in self.made:
                 continue
             self.made[cell] = self.stage = None
             made += 1
             for edge in self._leaving(cell):
-                if edge.limit is not None:
-                    wanted.add(edge.limit)
-                    waiting.appendleft(edge.limit)
-                if edge.target is not None:
-                    waiting.append(edge.target)
+                waiting += [each for each in (edge.limit, edge.target) if each is not None]
 
     def _leaving(self, cell: Cell) -> list[Edge]:
         """The transitions that leave a cell."""
@@ -170,10 +162,13 @@ class Splitter:
                 names = chain([transition.name], (f"{transition.name} ({k})" for k in count(2)))
                 name = next(each for each in names if each not in used)
                 used.add(name)
-                if edge.target is None or edge.target in self.made:
-                    transitions.append(attrs.evolve(transition, name=name))
-                    continue
                 # Names of earlier stages stay: a run in another thread may still be on such a stage.
+                if edge.target is None or edge.target in self.made:
+                    limit = transition.accumulates_to
+                    if edge.limit is not None and edge.limit not in self.made:
+                        self.frontier[name], limit = edge.limit, None
+                    transitions.append(attrs.evolve(transition, name=name, accumulates_to=limit))
+                    continue
                 self.frontier[name] = edge.target
                 onward = transition.source, None, transition.guard
                 transitions.append(Transition(*onward, name=name, part_of=transition.part_of))
@@ -207,24 +202,6 @@ class Splitter:
         ]
         return Pieces(index, field, watched, self.variables, self.surfaces)
 
-    def _guard(self, transition: Transition) -> Expression | None:
-        try:
-            found = trace(
-                transition.guard.function, self.variables.components, self.variables.parameter_names
-            )
-        except TraceError:
-            return None
-        return None if transition.clock else found[0]
-
-    def _reset(self, transition: Transition) -> list[Expression] | None:
-        if transition.reset is None:
-            return [*self.symbols.x]
-        try:
-            reset = WholeReset(transition.reset.function, self.variables.components)
-            return trace(reset, self.variables.components, self.variables.parameter_names)
-        except TraceError:
-            return None
-
     def _mode(self, cell: Cell) -> Mode:
         original = self.original.modes[cell.mode]
         if not cell.branches:
@@ -246,6 +223,7 @@ class Splitter:
         """The transitions of a state that reaches a surface from one side."""
         pieces = self.pieces[cell.mode]
         height, time = self._height(number), timed(self.surfaces, number)
+        free = pieces.ties.free(dict(cell.branches))
         crossing: Any = time.clock(side, self.names.words) if time else Guard(height, -side)
         beyond, turns = {**dict(cell.sides), number: -2 * side}, False
         for choice in pieces.choices(beyond):
@@ -256,12 +234,13 @@ class Splitter:
                     more = [*extra, *self._on(resting.chosen)]
                     yield self._edge(cell, resting.cell, Guard(height, -side, when=_all(more)))
                 continue
-            joined = cell.sliding and not corners.are_apart(pieces, sides, [*cell.sliding, number])
+            joined = free and not corners.are_apart(pieces, sides, [*free, number])
             passes = not pieces.jumps(sides, number) or not (joined or pieces.may_attract(sides, number))
+            limit = None if time or joined else rests.cell_of(pieces, cell, sides, number)
             if time or not passes:
                 yield self._edge(cell, choice.cell, self._at_start(number, side, extra))
             if passes:
-                yield self._edge(cell, choice.cell, attrs.evolve(crossing, when=_all(extra)))
+                yield self._edge(cell, choice.cell, attrs.evolve(crossing, when=_all(extra)), limit=limit)
                 continue
             if joined:
                 turns = True
@@ -273,9 +252,9 @@ class Splitter:
                 more = [self._condition(arrives), *extra, *self._on(sliding.chosen)]
                 yield self._edge(cell, sliding.cell, Guard(height, -side, when=_all(more)))
             onwards = [self._condition(crosses), *extra]
-            yield self._edge(cell, choice.cell, Guard(height, -side, when=_all(onwards)))
+            yield self._edge(cell, choice.cell, Guard(height, -side, when=_all(onwards)), limit=limit)
         if turns:
-            yield from self._turns(cell, crossing, corners.arrivals(cell.sliding, number, side))
+            yield from self._turns(cell, crossing, corners.arrivals(free, number, side))
 
     def _at_start(self, number: int, side: int, extra: list[Expression]) -> Guard:
         """The guard that excludes a start on the wrong side of a surface."""
@@ -296,9 +275,10 @@ class Splitter:
         asked = corners.reaches_end(pieces, cell, ways[0], leaving)
         possible = []
         for k, corner in enumerate(ways):
-            left = [number for number in cell.sliding if corner[number]]
+            moved = pieces.ties.along(dict(cell.branches), {n: 2 * s for n, s in corner.items()})
+            left = [number for number in cell.sliding if moved[number]]
             reset = Reset(corners.projection(pieces, cell, left)) if left else None
-            for choice in pieces.choices({**dict(cell.sides), **{n: 2 * s for n, s in corner.items()}}):
+            for choice in pieces.choices({**dict(cell.sides), **moved}):
                 sides = {**dict(cell.branches), **choice.sides}
                 if not corners.may_slide(pieces, sides):
                     continue
@@ -310,29 +290,33 @@ class Splitter:
         end = attrs.evolve(cast(Any, guard), when=_all([*asked, Not(reduce(Or, possible))]))
         yield Edge(Transition(source, None, end, name=f"{source}: no way on at {where}"), None)
 
-    def _edge(self, cell: Cell, target: Cell, guard: Guard | Clock, reset: Reset | None = None) -> Edge:
+    def _edge(
+        self,
+        cell: Cell,
+        target: Cell,
+        guard: Guard | Clock,
+        reset: Reset | None = None,
+        limit: Cell | None = None,
+    ) -> Edge:
         source, to = self.name_of(cell), self.name_of(target)
         name = f"{source}->{to} at the start" if guard.at_start else f"{source}->{to}"
-        return Edge(Transition(source, to, guard, reset, name=name), target)
+        rest = None if limit is None else self.name_of(limit)
+        return Edge(Transition(source, to, guard, reset, name=name, accumulates_to=rest), target, limit)
 
     def _departures(self, cell: Cell, number: int) -> Iterator[Edge]:
         """The transitions of a state that slides along a surface and leaves it."""
         pieces, source, sides = self.pieces[cell.mode], self.name_of(cell), dict(cell.branches)
-        surface = pieces.between(sides, number)
-        height = self._height(number)
-        is_off = self._condition(pieces.beside(sides, number).is_off)
-        ways = [
-            (side, choice.cell, self._on(choice.chosen))
-            for side in (1, -1)
-            for choice in pieces.choices({**dict(cell.sides), number: 2 * side})
-        ]
-        for side, target, extra in ways:
-            off = Guard(height, side, when=_all([is_off, *extra]), at_start=True)
-            yield self._edge(cell, target, off)
-        if pieces.rests(sides, number):
+        led, free = number in pieces.ties.at(sides), pieces.ties.free(sides)
+        near = pieces.beside(sides, number)
+        is_off = rests.is_off(pieces, number) if led else self._condition(near.is_off)
+        for side, choice in rests.around(pieces, cell, number):
+            when = _all([is_off, *self._on(choice.chosen)])
+            yield self._edge(cell, choice.cell, Guard(self._height(number), side, when=when, at_start=True))
+        if led or pieces.rests(sides, number):
             return
-        apart = corners.are_apart(pieces, sides, cell.sliding)
-        if apart or number == cell.sliding[0]:
+        surface = pieces.between(sides, number)
+        apart = corners.are_apart(pieces, sides, free)
+        if apart or number == free[0]:
             attracts = (
                 self._function(surface.attraction) if apart else scalar(corners.attraction(pieces, sides))
             )
@@ -340,14 +324,18 @@ class Splitter:
             for guard, name in (at_start, "two-fold at start"), (Guard(attracts, -1), "two-fold"):
                 yield Edge(Transition(source, None, guard, name=f"{source}: {name}"), None)
         if apart:
-            reset = Reset(corners.projection(pieces, cell, [number]))
-            for side, target, extra in ways:
+            left = pieces.ties.along(sides, {number: 2})
+            reset = Reset(corners.projection(pieces, cell, [*left]))
+            for side in (1, -1):
                 speed = self._function(surface.speed_above if side > 0 else surface.speed_below)
-                yield self._edge(cell, target, Guard(speed, side, when=_all(extra)), reset)
+                beyond = pieces.ties.along(sides, {number: 2 * side})
+                for choice in pieces.choices({**dict(cell.sides), **beyond}):
+                    when = _all(self._on(choice.chosen))
+                    yield self._edge(cell, choice.cell, Guard(speed, side, when=when), reset)
             return
         for side in (1, -1):
             speed = self._function(surface.speed_above if side > 0 else surface.speed_below)
-            yield from self._turns(cell, Guard(speed, 0), corners.exits(cell.sliding, number, side), number)
+            yield from self._turns(cell, Guard(speed, 0), corners.exits(free, number, side), number)
 
     def _height(self, number: int) -> Function:
         if number not in self.heights:

@@ -29,6 +29,7 @@ from hybrid.kernels.jumps.record import remember_flight, remember_jump
 from hybrid.kernels.jumps.rest import ROUNDED
 from hybrid.kernels.limit.endless import hold_endless, mark_endless, may_be_held
 from hybrid.kernels.limit.impacts import extrapolate_impacts, series_of_impacts
+from hybrid.kernels.limit.meeting import is_close, may_be_mapped, meeting_matrix
 from hybrid.kernels.limit.rounds import (
     FEWEST_JUMPS,
     NO_SERIES,
@@ -48,6 +49,9 @@ from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH
 from hybrid.kernels.types.layout import Path, Task
 from hybrid.kernels.types.options import KERNEL, exported
 from hybrid.kernels.types.task import task_of
+
+# The guards of a round are landed on in turn, so many times: once is enough if no two read one component.
+SWEEPS = 3
 
 
 @njit(**KERNEL)
@@ -253,23 +257,52 @@ def forget_tangents(task):
 
 
 @njit(**KERNEL)
+def land_on_guards(model, turn, t, run, work):
+    """Move the limit ``work.settled (n,)`` of the last ``turn`` jumps onto their guards, to first order.
+
+    Extrapolation leaves it beside them by its rounding. The components move in proportion to the squares of
+    their sizes in ``work.trial``, so that units do not matter.
+    """
+    n, x, sizes = model.dimension, work.settled, work.trial
+    for _ in range(SWEEPS):
+        for back in range(turn):
+            transition = fired_before(run, back)
+            if may_jump(model, run, transition, t, x, work):
+                continue
+            value = guard_value(model, transition, t, x, work.scalar)
+            model.guard_gradient(transition, t, x, model.parameters, work.gradient)
+            total = 0.0
+            for i in range(n):
+                total += (work.gradient[i] * sizes[i]) ** 2
+            for i in range(n if total > 0.0 else 0):
+                x[i] -= value * work.gradient[i] * sizes[i] ** 2 / total
+
+
+@njit(**KERNEL)
 def go_to_limit(task, series, transition):
     """Go to the limit ``work.settled`` of a series, whose next jump would be that ``transition``.
 
     The limit is a jump of its own, into the mode that the transition names, if it names one. Its tangent map
-    is known for impacts on one guard. Returns false, and does nothing, if later jumps tell it better.
+    is known for impacts on one guard, and for rounds between two guards that keep the state. Returns false,
+    and does nothing, if later jumps tell it better.
     """
     _, model, method, run, record, work = task_of(task)
     n, tangents, turn, left = model.dimension, task.tangents, series.turn, series.left
-    target, onward = mode_of_limit(model, run, transition, run.phase + left, work.settled, work)
     alone = turn == 1 and run.chattering > 0 and left > 0.0
+    if not alone:
+        land_on_guards(model, turn, run.phase + left, run, work)
+    target, onward = mode_of_limit(model, run, transition, run.phase + left, work.settled, work)
     if alone and tangents > 0 and not drift_is_known(model, run, transition, left, work):
+        return False
+    named = model.accumulates_to[transition] != NO_MODE
+    mapped = tangents > 0 and named and may_be_mapped(model, run, turn)
+    if mapped and left > 0.0 and not is_close(model, method, run, series, work):
         return False
     if not may_be_held(model, run, turn, left):
         return False
     if alone:
         limit_matrix(model, method, run, transition, target, left, work)
-    else:
+    elif not (mapped and meeting_matrix(model, run, turn, target, left, work)):
         forget_tangents(task)
     if left > 0.0:
         remember_flight(run, record, n, left, work.settled)
