@@ -13,6 +13,7 @@ import numpy as np
 
 from hybrid.compiler.traced import Traces, expressions_of
 from hybrid.errors import ModelError
+from hybrid.expression.derivatives import derivative
 from hybrid.expression.evaluation import Program
 from hybrid.expression.graph import nodes_of
 from hybrid.expression.nodes import Expression
@@ -26,8 +27,8 @@ from hybrid.system.graph import HybridSystem
 NAME = re.compile(r'"(T[0-9a-f]{16})"')
 # The rounding of an affine argument and of its inverse, as a share of the terms, with a margin.
 MARGIN = 16.0 * float(np.finfo(float).eps)
-# Halvings that bring an interval of this size down to two neighbouring numbers, unless these are next to 0.
-MOST_HALVINGS = 64
+# The least argument below 0 that no rounding makes 0.
+LEAST = float(np.finfo(float).tiny)
 
 
 class Tables:
@@ -92,15 +93,16 @@ class Knots:
             length = 0.0 if repeat is None else self._number(repeat, values)
             repeats.append(length if 0.0 < length < np.inf else 0.0)
             if repeat is None:
-                knots = np.sort(np.concatenate([self._times(node, values) for node in tables]))
-                bounds.append(np.nextafter(knots, -np.inf))
+                found = [self._times(node, values) for node in tables]
+                knots, before = (np.concatenate(each) for each in zip(*found, strict=True))
             else:
                 found = [self._times_in_period(node, values, length) for node in tables]
                 knots = np.concatenate([*(times for times, _ in found), [length]])
-                order = np.argsort(knots)
-                knots = knots[order]
-                bounds.append(knots - np.concatenate([*(bands for _, bands in found), [0.0]])[order])
-            groups.append(knots)
+                before = knots - np.concatenate([*(bands for _, bands in found), [0.0]])
+            order = np.argsort(knots)
+            groups.append(knots[order])
+            # A step ends before each of the knots that are still to come.
+            bounds.append(np.minimum.accumulate(before[order][::-1])[::-1])
         knots = np.concatenate([np.empty(0), *groups])
         return {
             "first_group": self.first_group,
@@ -134,29 +136,22 @@ class Knots:
         times, bands = np.append(times, soon), np.append(bands, MARGIN * length)
         return times, bands
 
-    def _times(self, node: Tabulated, values: np.ndarray) -> np.ndarray:
-        """The first times at which the argument of a table has reached its knots, in floating point."""
-        knots = node.pieces.knots
-        if node.args[0] is self.symbols.t:
-            return knots
-        program, known = Program(node.args), dict(zip(self.symbols.p, values, strict=False))
+    def _times(self, node: Tabulated, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The first times at which ``a t + b`` has certainly reached the knots, and the last before them.
 
-        def argument(t: np.ndarray) -> np.ndarray:
-            return np.asarray(program.run({**known, self.symbols.t: t})[0], dtype=float)
-
-        start, end = argument(np.array([0.0, 1.0]))
-        slope = end - start
-        if not (np.isfinite(slope) and slope != 0.0):
-            return np.full(len(knots), np.inf)
-        times = (knots - start) / slope
-        around = MARGIN * (np.abs(knots) + np.abs(start) + np.abs(end)) / abs(slope)
-        low, high = times - around, times + around
-        for _ in range(MOST_HALVINGS):
-            middle = 0.5 * (low + high)
-            # A falling argument leaves a piece right behind its knot, where that piece still holds.
-            reached = argument(middle) >= knots if slope > 0.0 else argument(middle) < knots
-            low, high = np.where(reached, low, middle), np.where(reached, middle, high)
-        return high
+        Each function rounds ``a t + b`` in its own way. In between, the piece depends on this rounding, so no
+        step looks there.
+        """
+        knots, t = node.pieces.knots, self.symbols.t
+        if node.args[0] is t:
+            return knots, np.nextafter(knots, -np.inf)
+        start, slope = self._number(node.args[0], values), self._number(derivative(node.args[0], t), values)
+        if not (np.isfinite(start) and np.isfinite(slope) and slope != 0.0):
+            return np.full(len(knots), np.inf), np.full(len(knots), np.inf)
+        times, bands = (knots - start) / slope, MARGIN * (np.abs(knots) + abs(start)) / abs(slope)
+        # A falling argument leaves a piece right behind its knot, where that piece still holds.
+        behind = times + bands if slope > 0.0 else times + np.maximum(bands, LEAST / -slope)
+        return behind, np.nextafter(times - bands, -np.inf)
 
 
 def _tables_in_time(system: HybridSystem, index: int, traces: Traces) -> Iterator[Tabulated]:

@@ -276,8 +276,7 @@ def next_knot(model, run):
             middle = run.phase - within + at
             apart = ROUNDING_OF_KNOT * abs(middle) + (at - before)
             at, before = middle + apart, middle - apart
-        if at < knot:
-            last, knot = before, at
+        last, knot = min(last, before), min(knot, at)
     return last, knot
 
 

@@ -26,7 +26,7 @@ def choose_mode(
 
     On a kink of a continuous field that the flow does not leave at once, the modes on all sides allow the
     state, and their motion is the same: the first of them is taken. If the mode is named, or the only one,
-    the transitions whose guards the state lies beyond come too.
+    the transitions whose guards the state lies beyond come too, unless the mode excludes the state.
 
     Raises
     ------
@@ -47,8 +47,10 @@ def choose_mode(
             index = within[0]
             if codes.BEYOND not in verdicts:
                 return index, ()
-            said = zip(system.transitions, verdicts, strict=True)
-            beyond = [tr for tr, verdict in said if verdict == codes.BEYOND and tr.source == modes[index]]
+            own = [i for i, transition in enumerate(system.transitions) if transition.source == modes[index]]
+            if any(verdicts[i] == codes.LEAVES and _excludes_start(system, model, i) for i in own):
+                return index, ()
+            beyond = [system.transitions[i] for i in own if verdicts[i] == codes.BEYOND]
             return index, tuple(tr.name for tr in beyond)
         return _refused(system, run, verdicts, [modes[i] for i in within])
     verdicts, undefined = _verdicts(system, parts, model, run, work, range(len(modes)))
@@ -60,6 +62,13 @@ def choose_mode(
     if len(allowed) == 1 or move_alike(system, model, run, allowed):
         return modes.index(allowed[0]), ()
     return _refused(system, run, verdicts, allowed)
+
+
+def _excludes_start(system: HybridSystem, model: Any, index: int) -> bool:
+    """Whether a transition only leads starts that its mode excludes into another mode."""
+    transition = system.transitions[index]
+    leads_away = transition.target != transition.source and model.enters[index] == 1
+    return bool(transition.guard.at_start and leads_away)
 
 
 def _refused(system: HybridSystem, run: Any, verdicts: list[int], allowed: list[str]) -> NoReturn:

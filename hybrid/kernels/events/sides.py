@@ -70,15 +70,26 @@ def sides_of(run):
 
 
 @njit(**KERNEL)
-def inherit(model, left, transition, sides):
+def excludes_start(model, mode, fired):
+    """Whether a transition has fired because the mode excludes the start: the run was never in the mode."""
+    for slot in range(model.first_at_start[mode], model.first_at_start[mode + 1]):
+        if model.at_start[slot] == fired:
+            return model.enters[fired] == 1
+    return False
+
+
+@njit(**KERNEL)
+def inherit(model, left, fired, transition, sides):
     """Take over what the mode just left knew of a transition's guard; returns whether it has the guard.
 
-    A crossing is still due only if no transition on that guard in that direction has fired for it. On a guard
-    at rest each direction has its own near side: the side for the same direction counts, if there is one.
+    A mode that excludes the start of the run knows nothing. A crossing is still due only if no transition on
+    that guard in that direction has fired for it. On a guard at rest each direction has its own near side:
+    the side for the same direction counts, if there is one.
     """
     side, due, zero = sides
     known, pending, now, order = False, -1, 0, 0
-    for slot in range(model.first_outgoing[left], model.first_outgoing[left + 1]):
+    first, last = model.first_outgoing[left], model.first_outgoing[left + 1]
+    for slot in range(first, first if excludes_start(model, left, fired) else last):
         other = model.outgoing[slot]
         if model.surface[other] != model.surface[transition]:
             continue
@@ -240,7 +251,7 @@ def take_side(model, run, place, transition, arrival, known_sides, work):
     direction = model.direction[transition]
     known = came != STARTED
     if came == LANDED and left != mode:
-        known = inherit(model, left, transition, known_sides)
+        known = inherit(model, left, fired, transition, known_sides)
     before = Before(known_sides.side[transition], known_sides.zero[transition]) if known else Before(0, 0)
     own = came == LANDED and left == mode and transition == fired
     now, order = side_here(model, run, place, transition, came, before, own, work)

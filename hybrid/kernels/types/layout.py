@@ -107,7 +107,7 @@ class Model(Structure):
     them have in each mode. ``period`` is 0 without a forcing period.
     The times at which tables in mode ``m`` have their points, which end steps, come in the groups
     ``first_group[m]`` to ``first_group[m + 1]``: ``knots[first_knot[g]:first_knot[g + 1]]``, which come again
-    after ``repeat[g]`` unless that is 0. ``before_knots`` are the floating-point numbers before them.
+    after ``repeat[g]`` unless that is 0. ``before_knots`` are the last times certainly before them.
     ``parameters`` go on behind the parameters themselves: there the numbers of the tables are.
     """
 

@@ -1,11 +1,14 @@
 """Tables in model functions, against closed forms."""
 
 import pickle
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly, make_interp_spline
 
 from hybrid import (
@@ -30,6 +33,7 @@ RNG = np.random.default_rng(0)
 TIMES = np.sort(RNG.uniform(0.0, 10.0, 40))
 VALUES = RNG.standard_normal(40)
 SOLVERS = [None, DOP853(), Tsit5(), RadauIIA()]
+STAIRS = Table([0.0, 1.0, 2.0, 3.5], [0.0, 3.0, -1.0, 0.5], kind="step")
 
 
 def tank(rate, **parameters):
@@ -72,6 +76,53 @@ def test_the_knots_of_an_affine_time_follow_the_parameters(a, b):
     assert found == pytest.approx(wanted, abs=1e-12)
     many = simulate_many(system, [(0.0,), (1.0,)], (0.0, 10.0), parameters=given)
     np.testing.assert_allclose(many.x_end.values.ravel(), [wanted, 1.0 + wanted], atol=1e-12)
+
+
+# Four ways to stretch time, with the factor and the offset of time that each one makes of ``d``.
+STRETCHED = {
+    "quotient": (lambda t, p: t / p.d, lambda d: (1.0 / d, 0.0)),
+    "shifted quotient": (lambda t, p: t / p.d + 0.25, lambda d: (1.0 / d, 0.25)),
+    "reciprocal": (lambda t, p: 2.0 * t * (1.0 / p.d), lambda d: (2.0 / d, 0.0)),
+    "falling": (lambda t, p: (3.5 - t) / p.d, lambda d: (-1.0 / d, 3.5 / d)),
+}
+
+
+@pytest.mark.parametrize("name", STRETCHED)
+@given(d=st.floats(0.5, 1.5))
+@settings(max_examples=25)
+def test_every_piece_of_a_stretched_table_acts_for_its_whole_time(name, d):
+    """However the functions of the model round the argument, each step has the piece that holds inside it."""
+    argument, affine = STRETCHED[name]
+    a, b = affine(d)
+    knots = np.sort([(k - b) / a for k in STAIRS.x if 0.0 < (k - b) / a < 6.0])
+    times, right = [0.0, *knots, 6.0], 0.3
+    for start, end in pairwise(times):
+        limit = 2.0 * float(STAIRS(a * 0.5 * (start + end) + b))
+        right = limit + (right - limit) * np.exp(-0.5 * (end - start))
+    decay = tank(lambda t, x, p: (STAIRS(argument(t, p)) - 0.5 * x.q,), d=1.0)
+    for system in (decay, split(decay)):
+        for solver in SOLVERS:
+            arc = simulate(system, (0.3,), (0.0, 6.0), parameters={"d": d}, solver=solver)
+            assert arc["q"][-1] == pytest.approx(right, abs=1e-7)
+
+
+@pytest.mark.parametrize("a", [1e-6, -1e-6, 1e6, -1e6])
+def test_the_unit_of_time_of_a_stretched_table_does_not_matter(a):
+    """The table is read from its first point on, with an offset a thousand times as large as its points."""
+    system = tank(lambda t, x, p: (STAIRS(p.a * t + 1000.0),), a=1.0)
+    start, end = np.sort([(k - 1000.0) / a for k in (0.0, 5.0)])
+    arc = simulate(system, (0.0,), (start, end), parameters={"a": a})
+    assert arc["q"][-1] * abs(a) == pytest.approx(integral(STAIRS, 5.0), abs=1e-9)
+
+
+@pytest.mark.parametrize("d", [0.9, 0.7, 1.1])
+def test_a_run_may_end_and_begin_at_a_point_of_a_stretched_table(d):
+    system = tank(lambda t, x, p: (STAIRS(t / p.d) - 0.5 * x.q,), d=d)
+    whole = simulate(system, (0.3,), (0.0, 6.0))["q"][-1]
+    first = simulate(system, (0.3,), (0.0, d))
+    second = simulate(system, first.x[-1], (d, 6.0))
+    assert first.t[-1] == d
+    assert second["q"][-1] == pytest.approx(whole, rel=1e-10)
 
 
 def test_tangent_vectors_pass_the_knots():

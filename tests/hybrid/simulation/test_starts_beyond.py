@@ -48,6 +48,74 @@ def test_a_transition_at_the_start_that_fires_is_not_said_to_wait(start, fired):
     assert arc.status.message == "Reached the end."
 
 
+GUARDS_OF_THE_START = {
+    "none": None,
+    "the same": Guard(lambda t, x, p: x.q - 2.0, +1),
+    "falling": Guard(lambda t, x, p: x.q - 2.0, -1),
+    "both ways": Guard(lambda t, x, p: x.q - 2.0, 0),
+    "mirrored": Guard(lambda t, x, p: 4.0 - 2.0 * x.q, -1),
+    "at the start": Guard(lambda t, x, p: x.q - 2.0, +1, at_start=True),
+    "refused": Guard(lambda t, x, p: x.q - 2.0, +1, when=lambda t, x, p: x.q > 100.0),
+}
+
+
+@pytest.mark.parametrize("name", GUARDS_OF_THE_START)
+@pytest.mark.parametrize("first", [True, False])
+@pytest.mark.parametrize(("start", "fired"), [(1.5, ["ab"]), (2.0, ["ab", "bc"]), (2.5, ["ab", "bc"])])
+def test_a_guard_of_a_mode_that_excludes_the_start_decides_nothing_in_the_next_one(name, first, start, fired):
+    """A start beyond the guard of ``ab`` belongs to mode ``b``, whatever other guards leave mode ``a``."""
+    guard = GUARDS_OF_THE_START[name]
+    if first and start > 2.0 and name == "at the start":
+        # Mode ``a`` excludes the start by this guard too, and it is listed first.
+        fired = ["ac"]
+    other = [] if guard is None else [Transition("a", "c", guard, name="ac")]
+    ab = [Transition("a", "b", Guard(lambda t, x, p: x.q - 1.0, +1, at_start=True), name="ab")]
+    bc = Transition("b", "c", Guard(lambda t, x, p: x.q - 2.0, +1), name="bc")
+    system = HybridSystem(
+        state=("q",),
+        modes=[Mode(each, lambda t, x, p: (1.0,)) for each in "abc"],
+        transitions=[*(other + ab if first else ab + other), bc],
+    )
+    arc = simulate(system, (start,), (0.0, 0.1), mode="a")
+    assert [(jump.t, jump.transition) for jump in arc.jumps] == [(0.0, each) for each in fired]
+    assert arc.status.message == "Reached the end."
+
+
+@pytest.mark.parametrize("start", [1.0, 2.0, 2.5])
+def test_a_guard_that_has_fired_at_the_start_does_not_fire_again_in_the_next_mode(start):
+    """The guard of ``bc`` is that of ``cd``: the run has passed it once."""
+    ab = Transition("a", "b", Guard(lambda t, x, p: x.q - 0.5, +1, at_start=True), name="ab")
+    above = Guard(lambda t, x, p: x.q - 1.0, +1)
+    system = HybridSystem(
+        state=("q",),
+        modes=[Mode(each, lambda t, x, p: (1.0,)) for each in "abcd"],
+        transitions=[ab, Transition("b", "c", above, name="bc"), Transition("c", "d", above, name="cd")],
+    )
+    arc = simulate(system, (start,), (0.0, 1.0), mode="a")
+    assert [jump.transition for jump in arc.jumps] == ["ab", "bc"]
+
+
+def test_a_guard_that_the_start_is_beyond_is_told_where_the_run_stays_in_its_mode():
+    system = HybridSystem(
+        state=("q", "n"),
+        modes=[Mode("a", lambda t, x, p: (1.0, 0.0)), Mode("c", lambda t, x, p: (1.0, 0.0))],
+        transitions=[
+            Transition(
+                "a",
+                "a",
+                Guard(lambda t, x, p: x.q - 1.0, +1, at_start=True),
+                Reset(lambda t, x, p: {"n": x.n + 1.0}),
+                name="aa",
+            ),
+            Transition("a", "c", Guard(lambda t, x, p: x.q - 2.0, +1), name="ac"),
+        ],
+    )
+    arc = simulate(system, (2.5, 0.0), (0.0, 0.1), mode="a")
+    assert arc.mode[-1] == "a"
+    assert arc.status.code == StatusCode.START_BEYOND
+    assert "'ac'" in arc.status.message
+
+
 @pytest.mark.parametrize("order", [1, -1])
 @pytest.mark.parametrize(
     ("start", "above"),
