@@ -33,7 +33,7 @@ def crossing(place: Place, times: int) -> Pass | None:
     distance = DISTANCE
     while distance > NEAREST:
         guess = orbit.loop.plus(distance * units * direction)
-        found = repeated.family.corrected(guess, orbit, units, direction[None])
+        found = repeated.family.corrected(guess, orbit, units, direction[None], distance / 2.0)
         if found is not None:
             return found[0]
         distance /= 2.0

@@ -22,6 +22,8 @@ from hybrid.transform.aged import aged, with_age
 
 # A step may turn by this angle (its cosine).
 LEAST_COSINE = 0.95
+# A step is halved down to this length.
+SHORTEST_STEP = 1e-7
 # A run jumps where the equations say so if the times agree to this share of the period.
 SAME_TIME = 1e-6
 # Stretches are divided anew if errors grow by this much more along one of them than they may.
@@ -82,10 +84,11 @@ class Place:
 
     def step(self, lengths: np.ndarray) -> tuple[Place, int] | None:
         """The place at distances ``(k,)`` along the tangents, and how many corrections it took; or None."""
-        units = self.units
+        units, length = self.units, float(np.abs(lengths).max())
         guess = self.orbit.loop.plus(units * (lengths @ self.tangents + 0.5 * lengths[0] ** 2 * self.bend))
         try:
-            made = self.family.corrected(guess, self.orbit, units, self.tangents)
+            reach = max(length / 2.0, SHORTEST_STEP)
+            made = self.family.corrected(guess, self.orbit, units, self.tangents, reach)
         except ArgumentError:
             return None
         if made is None:
@@ -105,15 +108,29 @@ def distance(place: Place, other: Place) -> float:
 
 
 def passes_by(start: Place, before: Place, after: Place) -> bool:
-    """Whether a step passes the start of a walk."""
+    """Whether a step passes the start of a walk, whole turns of angles and whole forcing periods aside."""
     if after.family.route != start.family.route or before.family.route != start.family.route:
         return False
     units, first = start.units, start.orbit.loop.flat
-    one, other = ((each.orbit.loop.flat - first) / units for each in (before, after))
+    again = first + _same_again(start, after)
+    one, other = ((each.orbit.loop.flat - again) / units for each in (before, after))
     chord = other - one
     length = float(np.linalg.norm(chord))
     share = -one @ chord / length**2 if length > 0.0 else -1.0
     return bool(0.0 <= share <= 1.0 and np.linalg.norm(one + share * chord) < 0.1 * length)
+
+
+def _same_again(start: Place, after: Place) -> np.ndarray:
+    """Whole turns, and whole forcing periods or any time of an autonomous orbit, from one place to another."""
+    first, last, family = start.orbit.loop, after.orbit.loop, start.family
+    turns = family.system.turn_lengths[: family.n]
+    moved, late = np.mean(last.x - first.x, axis=0), float(np.mean(last.times - first.times))
+    around = np.where(turns > 0.0, np.round(moved / np.where(turns > 0.0, turns, 1.0)) * turns, 0.0)
+    if family.forced:
+        forcing = family.period(first.values) / family.periods
+        late = round(late / forcing) * forcing
+    times = np.full(len(first.times), late)
+    return np.concatenate([np.tile(around, len(first.x)), times, np.zeros(len(first.values))])
 
 
 def zero_between(place: Place, after: Place, function: Callable[[Place], float]) -> Place | None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import attrs
 import numpy as np
 
 from hybrid.orbits.continuation.change import Change, located
 from hybrid.orbits.continuation.place import (
+    SHORTEST_STEP,
     Place,
     distance,
     interpolated_zero,
@@ -23,13 +25,15 @@ from hybrid.orbits.continuation.smooth import TESTS, branch_point, halves, told
 # Lengths of steps along the branch, in units of the sizes of the orbit and of the range of the parameter.
 FIRST_STEP = 0.01
 LONGEST_STEP = 0.05
-SHORTEST_STEP = 1e-7
 # A step is lengthened after few corrections.
 FEW_CORRECTIONS = 3
 LONGER = 1.5
 # An orbit that is larger than the first one by this factor, the square root of rounding, grows without bound.
 UNBOUNDED = 2.0**26
 NOTHING = 1e-12
+# Along the last part of a walk, of this length, the parameter stands still if it changes by this share of its range.
+LAST_PART = 1.0
+STILL = 1e-9
 # Another branch crosses near a place where the equations are this near to singular; a step that ends there is
 # taken longer.
 CROSSED = 3e-3
@@ -51,6 +55,7 @@ class Event:
 def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | Event | str]:
     """Places along a branch with the events between them; the last item is why it ends."""
     length, start, passed = FIRST_STEP, place, list[tuple[tuple[Route, ...], float]]()
+    trace = [place]
     for _ in range(most):
         made = place.step(np.array([length]))
         if made is None:
@@ -108,10 +113,40 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
         if place is not start and passes_by(start, place, after):
             yield "closed"
             return
+        trace.append(after)
+        why = _stands_still(trace)
+        if why:
+            yield why
+            return
         if corrections <= FEW_CORRECTIONS:
             length = min(LONGEST_STEP, LONGER * length)
         place = refined(after)
     yield "most"
+
+
+def _stands_still(trace: list[Place]) -> str:
+    """Why a branch ends along whose last part the parameter stands still; empty if it does not.
+
+    The last part is dropped from the trace where it is longer than needed.
+    """
+    while len(trace) > 1 and trace[0].family.route != trace[-1].family.route:
+        trace.pop(0)
+    lengths = [
+        float(np.linalg.norm((b.orbit.loop.flat - a.orbit.loop.flat) / a.units)) if _alike(a, b) else 0.0
+        for a, b in pairwise(trace)
+    ]
+    while len(lengths) > 1 and sum(lengths[1:]) > LAST_PART:
+        trace.pop(0), lengths.pop(0)
+    values = [each.value for each in trace]
+    if sum(lengths) < LAST_PART or max(values) - min(values) > STILL * float(trace[0].sizes[0]):
+        return ""
+    periods = [each.orbit.loop.period for each in trace]
+    grows = periods[-1] > periods[0] and not trace[0].family.forced
+    return "homoclinic" if grows and np.all(np.diff(periods) > 0.0) else "family"
+
+
+def _alike(one: Place, other: Place) -> bool:
+    return len(one.orbit.loop.flat) == len(other.orbit.loop.flat)
 
 
 def _is_crossed(place: Place) -> bool:
