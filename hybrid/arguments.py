@@ -155,7 +155,7 @@ def time_span(name: str, value: object) -> tuple[float, float]:
 
 
 def within(times: np.ndarray, t0: float, t1: float) -> np.ndarray | None:
-    """Times that lie in ``[t0, t1]`` but for the rounding of sums and products, put into it; else None.
+    """Numbers that lie in ``[t0, t1]`` but for the rounding of sums and products, put into it; else None.
 
     Ten times 0.1 is 1.0 or the number before it, as it is computed: either means the end of a run to 1.0.
     """

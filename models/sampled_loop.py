@@ -46,7 +46,7 @@ def sampled_loop() -> HybridSystem:
     >>> import models
     >>> from hybrid import simulate
     >>> arc = simulate(models.sampled_loop(), {"y": 0.0}, (0.0, 12.0))
-    >>> round(float(arc["y"][-1]), 6), float(arc["u"].max())
+    >>> round(float(arc["y"][-1]), 6), round(float(arc["u"].max()), 6)
     (1.0, 1.5)
     """
     return HybridSystem(

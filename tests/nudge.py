@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from hybrid import arguments
+from hybrid.compiler.compiled import CompiledSystem
 from hybrid.simulation import memory
 from hybrid.sweep.rows import Rows
 from hybrid.system.variables import Variables
@@ -75,6 +76,8 @@ def _install():
         return begin(self, model, start_of(model, state), *others)
 
     memory.Memory.begin = nudged_begin
+    # A model with the default parameters is kept from test to test, with the numbers of the first one.
+    CompiledSystem.given = CompiledSystem.at
     Rows.values = wraps(values)(
         lambda self, point: values(self, {name: float(moved(number)) for name, number in point.items()})
     )

@@ -237,7 +237,13 @@ def case(made: Instant, seed: int, index: int, number: int) -> Case | None:
 
 
 # With AMBIGUOUS_ORDER the library reports that the order matters and continues in the listed order.
-ENDINGS = {"SUCCESS": "end", "AMBIGUOUS_ORDER": "end", "STUCK": "stuck", "TERMINAL": "terminal"}
+ENDINGS = {
+    "SUCCESS": "end",
+    "START_BEYOND": "end",
+    "AMBIGUOUS_ORDER": "end",
+    "STUCK": "stuck",
+    "TERMINAL": "terminal",
+}
 
 
 def difference(made: Instant, drawn: Case, solver: Any) -> tuple[str, str]:

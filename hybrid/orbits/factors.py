@@ -130,7 +130,8 @@ class Products:
         return Factors(self.factors, self.singular, suited(self.units, self.all_sizes), code)
 
     def _sizes_of(self, vectors: np.ndarray) -> np.ndarray:
-        found = np.abs(vectors @ self.basis.T)
+        with np.errstate(invalid="ignore"):  # a limit of no size leaves vectors without bound
+            found = np.abs(vectors @ self.basis.T)
         return found if np.all(np.isfinite(found)) else np.zeros_like(found)
 
 

@@ -16,6 +16,7 @@ from hybrid.orbits.newton import Point
 from hybrid.orbits.orbit import PeriodicOrbit, unaged
 from hybrid.orbits.shooting import Shooting
 from hybrid.simulation.interrupt import interrupted_status
+from hybrid.simulation.periods import check_time
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import DOP853, Solver
 from hybrid.system.clocks import Every, numbers_of
@@ -116,6 +117,7 @@ def periodic_orbit(
             raise ArgumentError(
                 f"period is for autonomous systems; this one has the forcing period {forcing}. Use periods=."
             )
+        check_time("t0", t0, forcing)
         point = Point(guess, t0, periods * forcing)
         compile_system(system)
         _check_clocks(system, state, parameters, t0, point.period)

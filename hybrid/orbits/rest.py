@@ -57,7 +57,8 @@ def drift(
     error += EPSILON * size
     blur, slopes = error[:, 0], np.where(np.abs(carried) > error, carried, 0.0)[:, 1:]
     known = np.where(magnitude > 0, magnitude, 1.0)
-    row = (error[:, 1:] / known[:, None] * magnitude).max(axis=1)
+    with np.errstate(over="ignore"):  # a size of 1e-300 beside one of 1e300
+        row = (error[:, 1:] / known[:, None] * magnitude).max(axis=1)
     chosen = np.flatnonzero(resting & (blur <= EPSILON * known) & (row <= EPSILON))
     if len(chosen) == 0:
         return None

@@ -23,7 +23,7 @@ from hybrid.simulation.simulate import simulate
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode, noting
-from hybrid.system.entries import has_age
+from hybrid.system.entries import are_ageless
 from hybrid.system.graph import HybridSystem, functions_of
 from hybrid.system.periodicity import angle_fault_at, closed_change
 
@@ -288,19 +288,12 @@ class Shooting:
         """Times after the guess, and how far they and those one period later are from jumps."""
         candidates = np.linspace(0, guess.period, 201)[:-1]
         at = np.searchsorted(arc.t, guess.t + candidates, side="right") - 1
-        candidates = candidates[self._is_ageless(arc.mode[at])]
+        candidates = candidates[are_ageless(self.system, arc.mode[at])]
         distance = np.minimum(
             np.abs(candidates[:, None] - jumps).min(axis=1),
             np.abs(candidates[:, None] + guess.period - jumps).min(axis=1),
         )
         return candidates, distance
-
-    def _is_ageless(self, modes: np.ndarray) -> np.ndarray:
-        """In which of these modes the state has no age, ``(N,)``; all count if it has one everywhere."""
-        system = self.system
-        ageless = [mode for mode in system.mode_names if system.age is None or not has_age(system, mode)]
-        found = np.isin(modes, ageless)
-        return found | ~found.any()
 
     def _moved(self, guess: Point, shift: float) -> tuple[Shooting, Point]:
         arc = self._follow(guess, shift, self.mode)
@@ -320,7 +313,7 @@ class Shooting:
         n = self.system.tangent_dimension
         extent, lengths = np.ptp(arc.x[:, :n], axis=0), self.system.turn_lengths[:n]
         apart = [closed_change(each, lengths) for each in arc(guess.t + times)[:, :n] - guess.x]
-        gaps = np.linalg.norm(apart / np.where(extent > 0, extent, 1.0), axis=1)
+        gaps = [length(each) for each in apart / np.where(extent > 0, extent, 1.0)]
         nearest = int(np.argmin(gaps))
         return float(times[nearest]) if gaps[nearest] < NEARER * gaps[SAMPLES - 1] else guess.period
 
@@ -334,7 +327,7 @@ class Shooting:
         times = arc.jumps.t
         # On a jump, rounding would decide whether a run from the point makes it.
         away = np.array([np.all(np.abs(times - t) > POINT_ERROR * orbit.period) for t in arc.t])
-        away &= self._is_ageless(arc.mode)
+        away &= are_ageless(self.system, arc.mode)
         i = int(np.argmin(np.where(away, np.linalg.norm(apart, axis=1), np.inf)))
         return attrs.evolve(orbit, x0=arc.x[i], mode=str(arc.mode[i]), t0=float(arc.t[i]))
 
@@ -470,8 +463,7 @@ class Shooting:
                 f"errors of the start grow by a factor of {growth:.3g} over the period, so no digit is left"
             )
             return told, START_NEARER
-        largest = np.abs([newton.anchor, shot.point.x, shot.end]).max()
-        if 0.0 < largest <= self.solver.atol:
+        if 0.0 < shot.magnitude.max() <= self.solver.atol:
             told = (
                 f"all states are below the atol of the solver, {self.solver.atol:.3g}, and so not controlled"
             )

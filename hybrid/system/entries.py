@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from hybrid.system.elements import Transition
 from hybrid.system.graph import HybridSystem
 
@@ -19,3 +21,10 @@ def has_age(system: HybridSystem, mode: str) -> bool:
     """Whether the age counts in a mode: elsewhere it is zero, and no perturbation moves it."""
     index = system.mode_index(mode)
     return (system.modes[index].part_of or mode) in system.aging
+
+
+def are_ageless(system: HybridSystem, modes: np.ndarray) -> np.ndarray:
+    """In which of these modes the state has no age, ``(N,)``; all count if it has one everywhere."""
+    ageless = [mode for mode in system.mode_names if system.age is None or not has_age(system, mode)]
+    found = np.isin(modes, ageless)
+    return found | ~found.any()

@@ -282,7 +282,7 @@ class TestPhasePortrait:
         arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 2.0))
         [line] = plot_phase_portrait(arc, "v", "q").lines
         v, q = line.get_xydata().T
-        assert (v[0], q[0]) == (0.0, 1.0)
+        assert (v[0], q[0]) == pytest.approx((0.0, 1.0), rel=1e-14)
         assert (v[-1], q[-1]) == (arc.x[-1, 1], arc.x[-1, 0])
         up = np.flatnonzero(np.diff(v) > 1.0)
         np.testing.assert_array_equal(v[up], arc.jumps.x_minus[:, 1])

@@ -238,9 +238,10 @@ def _ranges(bifurcation: Bifurcation, over: object) -> tuple[tuple[str, str], np
     for j, (name, span) in enumerate(over.items()):
         arguments.known("over: Parameter", name, parameters, "Parameters")
         ends = arguments.numbers(f"over[{name!r}]", span, "be (low, high)")
-        if ends.shape != (2,) or not ends[0] < ends[1] or not ends[0] <= parameters[name] <= ends[1]:
+        value = np.array([parameters[name]])
+        if ends.shape != (2,) or not ends[0] < ends[1] or arguments.within(value, *ends) is None:
             raise arguments.refusal(f"over[{name!r}]", f"be (low, high) around {parameters[name]}", span)
-        lows[j], highs[j] = ends
+        lows[j], highs[j] = min(ends[0], *value), max(ends[1], *value)
     first, second = over
     return (first, second), lows, highs
 

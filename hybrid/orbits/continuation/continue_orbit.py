@@ -113,9 +113,10 @@ def continue_orbit(
         raise arguments.refusal("span", "be (low, high)", span)
     low, high = ends.tolist()
     value = orbit.parameters[parameter]
-    if not low <= value <= high or not low < high:
+    if arguments.within(np.array([value]), low, high) is None or not low < high:
         got = arguments.shown(span)
         raise ArgumentError(f"span must be (low, high) around {parameter} = {value}; got {got}.")
+    low, high = min(low, value), max(high, value)
     most = arguments.count("max_steps", max_steps, 1)
     progress = None if progress is None else arguments.flag("progress", progress)
     method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)

@@ -57,6 +57,7 @@ ULPS = [*range(-24, 25), *(sign * far for far in (32, 50, 100, 300, 1000, 3000) 
     "solver", [Taylor(), DOP853(), Tsit5(), RadauIIA()], ids=lambda solver: type(solver).__name__
 )
 @pytest.mark.parametrize("name", PARTED)
+@pytest.mark.as_given
 def test_a_run_that_is_split_beside_a_marker_marks_the_crossing_once(name, solver):
     """The first part ends, and the second begins, within some units in the last place of the crossing."""
     field, guard, start, t0 = PARTED[name]

@@ -422,7 +422,7 @@ class TestBadArguments:
                 r"samples must be increasing times; got samples\[1\] = 1.0 before samples\[2\] = 0.5",
             ),
             ({"samples": [0.2, math.nan]}, r"samples must be finite; got samples\[1\] = nan"),
-            ({"samples": [-1.0, 0.5]}, r"samples must lie in t_span, \[0.0, 1.0\]; got times from -1.0"),
+            ({"samples": [-1.0, 0.5]}, r"samples must lie in t_span, \[0.0, .*\]; got times from -1.0"),
             ({"max_jumps": -1}, "max_jumps must be a whole number of at least 0; got -1"),
         ],
     )

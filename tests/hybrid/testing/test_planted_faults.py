@@ -340,6 +340,7 @@ def test_wrong_saltation_matrices(check, system, fault, text):
         (check_compiled, GATED, ValuesOff("reset"), "Transition 'floor': reset: value 0 is"),
     ],
 )
+@pytest.mark.as_given
 def test_faults_of_the_solver(check, system, engine, text):
     assert text in found(check, system, engine)
 

@@ -72,7 +72,7 @@ def test_a_late_run_is_as_good_as_an_early_one_or_says_that_it_is_not(name, solv
             assert arc.status.code in (StatusCode.ROUNDED_TIME, StatusCode.STEP_TOO_SMALL), t0
             assert "declare the period" in arc.status.remedy
         else:
-            assert abs(t0) < 1e9
+            assert abs(t0) < 3e9
         assert error < 1e-8 or not arc.status.ok, t0
 
 
