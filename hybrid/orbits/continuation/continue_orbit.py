@@ -35,7 +35,7 @@ NEAR_ONE = 1e-3
 
 ENDS = {
     "range": "the end of the range",
-    "closed": "the branch closes",
+    "closed": "its start: it is closed",
     "equilibrium": "a point, where the orbit has no size",
     "infinity": "an orbit that grows without bound",
     "homoclinic": "an orbit whose period grows without bound",

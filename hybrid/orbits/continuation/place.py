@@ -33,6 +33,8 @@ SHARES = (-1.0, -0.6, -0.25, 0.25, 0.6, 1.0)
 # Two of these polynomials agree to this, in units of the unknowns.
 AGREE = 1e-12
 LOOSE = 1e-7
+# A zero between two places may lie outside of them by this share of their distance.
+BESIDE = 1e-3
 MOST_ROUNDS = 5
 
 
@@ -187,7 +189,7 @@ def interpolated_zero(
                 heights.append(height)
         # A measure that takes a value twice does not tell the places apart.
         if len(places) < 3 or len(set(heights)) < len(heights):
-            return best
+            break
         unknowns = np.array([each.orbit.loop.flat for each in places])
         ends = [_at_zero(np.array(heights)[part], unknowns[part]) for part in (slice(None), slice(1, None))]
         units = place.units
@@ -205,7 +207,7 @@ def interpolated_zero(
         return None
     orbit = best.family.around(best.orbit.loop)
     found = best if orbit is None else attrs.evolve(best, orbit=orbit)
-    beside = high - low
+    beside = BESIDE * (high - low)
     return found if low - beside <= distance(place, found) <= high + beside else None
 
 

@@ -31,6 +31,8 @@ LONGER = 1.5
 # An orbit that is larger than the first one by this factor, the square root of rounding, grows without bound.
 UNBOUNDED = 2.0**26
 NOTHING = 1e-12
+# Two halves of an orbit are the same if they differ by this share of its size.
+SAME_HALVES = 1e-7
 # Along the last part of a walk, of this length, the parameter stands still if it changes by this share of its range.
 LAST_PART = 1.0
 STILL = 1e-9
@@ -100,9 +102,10 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
         if _turned(place, after):
             yield "equilibrium"
             return
-        half = _halved(place, after)
-        if half is not None:
-            yield Event("flip", half, "the orbit has half the period: this branch begins here")
+        if _comes_to_its_half(place, after):
+            half = _halved(place, after)
+            if half is not None and low <= half.value <= high:
+                yield Event("flip", half, "the orbit has half the period: this branch begins here")
             yield "flip"
             return
         yield from _between(place, after)
@@ -191,14 +194,22 @@ def _turned(place: Place, after: Place) -> bool:
     return bool(rates[0] @ rates[1] < 0.0)
 
 
-def _halved(place: Place, after: Place) -> Place | None:
-    """The place between two where the orbit becomes one of half the period."""
+def _comes_to_its_half(place: Place, after: Place) -> bool:
+    """Whether an orbit becomes one of half the period, or a step ends on the branch of these."""
     here, there = halves(place.orbit), halves(after.orbit)
-    if here is None or there is None or not here @ there < 0.0:
-        return None
+    if here is None or there is None or np.linalg.norm(here) <= SAME_HALVES:
+        return False
+    return bool(here @ there < 0.0 or np.linalg.norm(there) <= SAME_HALVES)
+
+
+def _halved(place: Place, after: Place) -> Place | None:
+    """The place near two where the orbit becomes one of half the period."""
+    here = halves(place.orbit)
+    assert here is not None
 
     def along(each: Place) -> float:
         found = halves(each.orbit)
         return 0.0 if found is None else float(here @ found)
 
-    return interpolated_zero(place, along, (0.0, distance(place, after)))
+    reach = distance(place, after)
+    return interpolated_zero(place, along, (0.0, reach)) or interpolated_zero(place, along, (0.0, 2.0 * reach))
