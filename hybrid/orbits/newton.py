@@ -63,7 +63,8 @@ class Shot:
     ``extent (n,)`` is how far each component moves, ``magnitude (n,)`` its largest absolute value. ``drift``
     knows how far components at rest are carried. ``beyond`` names the transitions whose guards the start lies
     beyond. ``departure`` is how far the start is from the values of conserved quantities that are held.
-    ``lengths (n,)`` are those of a turn of angles, 0 for other components.
+    ``lengths (n,)`` are those of a turn of angles, 0 for other components. ``at_steps`` is the largest
+    absolute value at the ends of steps, which the solver's tolerances control.
     """
 
     point: Point
@@ -80,6 +81,7 @@ class Shot:
     beyond: tuple[str, ...] = ()
     departure: Departure | None = None
     lengths: np.ndarray | None = None
+    at_steps: float = np.inf
 
     @property
     def gap(self) -> np.ndarray:

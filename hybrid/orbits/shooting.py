@@ -123,6 +123,7 @@ class Shooting:
             trajectory.beyond,
             None if self.held is None else self.held.departure(point.t, point.x, magnitude),
             self.system.turn_lengths[:n],
+            float(np.abs(arc.x).max()),
         )
 
     def _trajectory(self, point: Point, mode: str | None) -> Trajectory:
@@ -463,7 +464,9 @@ class Shooting:
                 f"errors of the start grow by a factor of {growth:.3g} over the period, so no digit is left"
             )
             return told, START_NEARER
-        if 0.0 < shot.magnitude.max() <= self.solver.atol:
+        ends = np.abs([newton.anchor, shot.point.x, shot.end]).max()
+        # The ends of a larger orbit may be zero to rounding, which its gap is known against.
+        if 0.0 < ends <= self.solver.atol and tolerance * shot.at_steps <= self.solver.atol:
             told = (
                 f"all states are below the atol of the solver, {self.solver.atol:.3g}, and so not controlled"
             )

@@ -264,8 +264,6 @@ def _status(trajectory: Trajectory, code: int) -> Status:
             "the first are not known.",
             "Shorten the steps by max_step= of the solver, or ask for fewer exponents.",
         )
-    if code == codes.DONE and (waiting := _never_fired(trajectory)):
-        return beyond_status(waiting)
     if code == codes.DONE and run.unknown_time:
         return Status(StatusCode.INFINITE_SLOPE, f"Reached the end. {_uncertain(trajectory)}", LOWER)
     if code == codes.DONE and run.lateness > MOST_LATENESS:
@@ -283,7 +281,8 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     if code == codes.DONE and grazed:
         return _grazed(trajectory, grazed)
     if code == codes.DONE:
-        return SUCCESS
+        waiting = _never_fired(trajectory)
+        return beyond_status(waiting) if waiting else SUCCESS
     where = _place(trajectory)
     names = trajectory.system.transition_names
     if code == codes.STUCK:

@@ -35,6 +35,8 @@ NO_COLUMN = -1
 # A range up to this factor wider than the range in the middle is all rounding: the sums that give the two
 # differ in their last digits only.
 NO_BETTER = 1.01
+# A place on a piece at a share of it that no jumps at simple shares meet.
+BESIDE = 0.3819660112501051
 # Pieces longer than this share of the step are not tested for lying within the tolerances: a guard that has
 # no zero is then clear on most of the step without that test.
 SHORT_PIECE = 1e-2
@@ -357,15 +359,20 @@ def _is_divisible(piece, path):
 
 @njit(**KERNEL)
 def halves_tell_more(model, path, guard, piece, work):
-    """Whether halving a piece helps: not if the guard's range on it is no wider than in its middle."""
+    """Whether halving a piece helps: not if the guard's range on it is no wider than at one place.
+
+    In the middle the range of a guard that jumps just there is as wide as on the whole piece. It is not at a
+    place beside.
+    """
     if not _is_divisible(piece, path):
         return False
     if not piece.width <= NO_BETTER * piece.spread:
         return True
+    if piece.spread < math.inf:
+        beside = bounds_at(model, path, guard, piece.low + BESIDE * (piece.high - piece.low), work)
+        return not piece.width <= NO_BETTER * (beside.high_middle - beside.low_middle)
     # The guard may have no value in the middle, but one elsewhere.
-    return not piece.spread < math.inf and (
-        _has_value(model, path, guard, piece.low, work) or _has_value(model, path, guard, piece.high, work)
-    )
+    return _has_value(model, path, guard, piece.low, work) or _has_value(model, path, guard, piece.high, work)
 
 
 @njit(**KERNEL)

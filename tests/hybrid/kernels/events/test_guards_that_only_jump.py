@@ -75,3 +75,30 @@ def test_thirds_are_passed_although_they_are_no_numbers_of_the_machine():
     made = system(lambda t, x, p: np.where(third(x.q) > x.n, 1.0, -1.0), 1, lambda t, x, p: {"n": third(x.q)})
     arc = simulate(made, (0.25, 0.0), SPAN)
     np.testing.assert_allclose(arc.jumps.t, np.arange(1, 39) / 3, rtol=1e-14)
+
+
+@pytest.mark.parametrize("solver", [Taylor(), DOP853(), RadauIIA()], ids=lambda solver: type(solver).__name__)
+@pytest.mark.parametrize("end", [4.0, 8.0, 10.0, 12.0, 100.0])
+@pytest.mark.parametrize("shift", [0.5, 1.0, 1.3])
+def test_a_jump_in_the_middle_of_a_step_is_met(solver, end, shift):
+    """A step over a constant field is the whole span, and is halved where the guard jumps."""
+    system = HybridSystem(
+        state=("y",),
+        parameters={"s": shift},
+        modes=[Mode("m", lambda t, x, p: (0.0,))],
+        transitions=[
+            Transition(
+                "m",
+                "m",
+                Guard(lambda t, x, p: np.where(np.mod(t - p.s, 2.0) < 1.0, 1.0, -1.0), +1),
+                name="on",
+            ),
+            Transition(
+                "m", "m", Guard(lambda t, x, p: np.where((t > 2) & (t < 5), 1.0, -1.0), +1), name="once"
+            ),
+        ],
+    )
+    arc = simulate(system, (0.0,), (0.0, end), solver=solver)
+    rises = np.arange(shift, end, 2.0)
+    np.testing.assert_allclose([each.t for each in arc.jumps["on"]], rises, atol=1e-9)
+    np.testing.assert_allclose([each.t for each in arc.jumps["once"]], [2.0], atol=1e-9)
