@@ -39,6 +39,7 @@ ENDS = {
     "equilibrium": "a point, where the orbit has no size",
     "infinity": "an orbit that grows without bound",
     "homoclinic": "an orbit whose period grows without bound",
+    "instant": "an orbit whose period becomes zero",
     "family": "orbits that all have one value of the parameter",
     "most": "the limit of steps",
     "lost": "Newton's method finds no orbit farther on",

@@ -29,8 +29,9 @@ ALONG = 1e-10
 # The corrections stop when they are this small.
 CONVERGED = 1e-12
 MOST_CORRECTIONS = 8
-# Each correction is at most this share of the one before it.
+# Each correction is at most this share of the one before it, or this share of how far an orbit may be.
 CONTRACTION = 0.5
+NEGLIGIBLE = 1e-3
 # Relative step of the difference that gives the slope of a period that cannot be traced.
 STEP = 1e-5
 # A singular value of the scaled equations is zero if it is this share of the largest.
@@ -137,12 +138,14 @@ class Family:
         return expressed([derivative(expression, each) for each in wanted])
 
     def around(self, loop: Loop, most: int | None = None) -> Pass | None:
-        """One pass from these unknowns; None if a stretch does not reach its end, in ``most`` steps or jumps."""
+        """One pass from these unknowns; None if a stretch does not end in so many steps or jumps."""
         if not np.all(np.isfinite(loop.flat)) or np.any(np.abs(np.diff(loop.times)) > 4.0 * abs(loop.period)):
             return None
         try:
             flows = tuple(
-                self.flow(stretch, loop.x[i], float(loop.times[i]), float(loop.times[i + 1]), loop.values, most)
+                self.flow(
+                    stretch, loop.x[i], float(loop.times[i]), float(loop.times[i + 1]), loop.values, most
+                )
                 for i, stretch in enumerate(self.route)
             )
             landings = tuple(
@@ -187,7 +190,7 @@ class Family:
                 return found, corrections
             loop = loop.plus(units * change)
             away = float(np.abs((loop.flat - predicted) / units).max())
-            if away > reach or (length > CLOSED and length > CONTRACTION * before):
+            if away > reach or length > max(CONTRACTION * before, NEGLIGIBLE * reach):
                 return None
             before = length
         return None
@@ -201,7 +204,7 @@ class Family:
         values: np.ndarray,
         most: int | None = None,
     ) -> Flow:
-        """The motion of a stretch; ArithmeticError if it does not reach its end, in ``most`` steps or jumps."""
+        """The motion of a stretch; ArithmeticError if it does not end in so many steps or jumps."""
         n, state = len(x), self.extended_state(np.append(x, stretch.counters), values)
         mode = self.extended.mode_index(stretch.mode)
         last_mode = self.extended.mode_index(stretch.end_mode)

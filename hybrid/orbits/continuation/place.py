@@ -52,12 +52,15 @@ class Place:
         Units ``(k,)`` of the parameters.
     bend
         Derivative ``(m + k,)`` of the first tangent along the branch, as far as it is known.
+    firm
+        Whether the equations hold the orbit on the branch: not where other orbits are beside it.
     """
 
     orbit: Pass
     tangents: np.ndarray
     sizes: np.ndarray
     bend: np.ndarray | float = 0.0
+    firm: bool = True
 
     @property
     def family(self) -> Family:
@@ -89,7 +92,7 @@ class Place:
         units, length = self.units, float(np.abs(lengths).max())
         guess = self.orbit.loop.plus(units * (lengths @ self.tangents + 0.5 * lengths[0] ** 2 * self.bend))
         try:
-            reach = max(length / 2.0, SHORTEST_STEP)
+            reach = max(length / 2.0, SHORTEST_STEP) if self.firm else 1.0
             made = self.family.corrected(guess, self.orbit, units, self.tangents, reach)
         except ArgumentError:
             return None
@@ -123,7 +126,7 @@ def passes_by(start: Place, before: Place, after: Place) -> bool:
 
 
 def _same_again(start: Place, after: Place) -> np.ndarray:
-    """Whole turns, and whole forcing periods or any time of an autonomous orbit, from one place to another."""
+    """Whole turns, and whole forcing periods or any time without forcing, from one place to another."""
     first, last, family = start.orbit.loop, after.orbit.loop, start.family
     turns = family.system.turn_lengths[: family.n]
     moved, late = np.mean(last.x - first.x, axis=0), float(np.mean(last.times - first.times))
@@ -229,7 +232,7 @@ def place_of(orbit: Pass, onward: np.ndarray, sizes: np.ndarray) -> Place | None
     # There are more directions than parameters where orbits come in families of their own.
     null = vectors[min(int(np.sum(values > ROUNDING * values[0])), len(matrix.T) - len(sizes)) :]
     left, _, right = np.linalg.svd(onward @ null.T, full_matrices=False)
-    return Place(orbit, left @ right @ null, sizes)
+    return Place(orbit, left @ right @ null, sizes, firm=bool(values[-1] > LOOSE * values[0]))
 
 
 def begun(family: Family, loop: Loop, sizes: np.ndarray) -> Place | None:

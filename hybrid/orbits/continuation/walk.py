@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
 
 import attrs
 import numpy as np
@@ -33,9 +32,11 @@ UNBOUNDED = 2.0**26
 NOTHING = 1e-12
 # Two halves of an orbit are the same if they differ by this share of its size.
 SAME_HALVES = 1e-7
-# Along the last part of a walk, of this length, the parameter stands still if it changes by this share of its range.
-LAST_PART = 1.0
-STILL = 1e-9
+# Along the last part of a walk, of this length, the parameter stands still if it changes by this share of its
+# range. The period grows without bound, or becomes zero, if it changes by this factor there.
+LAST_PART = 0.5
+STILL = 1e-8
+GROWN = 1.05
 # Another branch crosses near a place where the equations are this near to singular; a step that ends there is
 # taken longer.
 CROSSED = 3e-3
@@ -57,7 +58,7 @@ class Event:
 def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | Event | str]:
     """Places along a branch with the events between them; the last item is why it ends."""
     length, start, passed = FIRST_STEP, place, list[tuple[tuple[Route, ...], float]]()
-    trace = [place]
+    trace: list[tuple[float, float, float]] = []
     for _ in range(most):
         made = place.step(np.array([length]))
         if made is None:
@@ -116,8 +117,8 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
         if place is not start and passes_by(start, place, after):
             yield "closed"
             return
-        trace.append(after)
-        why = _stands_still(trace)
+        trace.append((distance(place, after), after.value, after.orbit.loop.period))
+        why = _stands_still(trace, after)
         if why:
             yield why
             return
@@ -127,29 +128,19 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
     yield "most"
 
 
-def _stands_still(trace: list[Place]) -> str:
+def _stands_still(trace: list[tuple[float, float, float]], place: Place) -> str:
     """Why a branch ends along whose last part the parameter stands still; empty if it does not.
 
-    The last part is dropped from the trace where it is longer than needed.
+    The trace has the length of each step, with the parameter and the period after it.
     """
-    while len(trace) > 1 and trace[0].family.route != trace[-1].family.route:
+    while sum(length for length, *_ in trace[1:]) > LAST_PART:
         trace.pop(0)
-    lengths = [
-        float(np.linalg.norm((b.orbit.loop.flat - a.orbit.loop.flat) / a.units)) if _alike(a, b) else 0.0
-        for a, b in pairwise(trace)
-    ]
-    while len(lengths) > 1 and sum(lengths[1:]) > LAST_PART:
-        trace.pop(0), lengths.pop(0)
-    values = [each.value for each in trace]
-    if sum(lengths) < LAST_PART or max(values) - min(values) > STILL * float(trace[0].sizes[0]):
+    lengths, values, periods = np.array(trace).T
+    if lengths.sum() < LAST_PART or np.ptp(values) > STILL * float(place.sizes[0]):
         return ""
-    periods = [each.orbit.loop.period for each in trace]
-    grows = periods[-1] > periods[0] and not trace[0].family.forced
-    return "homoclinic" if grows and np.all(np.diff(periods) > 0.0) else "family"
-
-
-def _alike(one: Place, other: Place) -> bool:
-    return len(one.orbit.loop.flat) == len(other.orbit.loop.flat)
+    if place.family.forced or periods[0] <= GROWN * periods[-1] <= GROWN**2 * periods[0]:
+        return "family"
+    return "homoclinic" if periods[-1] > periods[0] else "instant"
 
 
 def _is_crossed(place: Place) -> bool:
@@ -212,4 +203,6 @@ def _halved(place: Place, after: Place) -> Place | None:
         return 0.0 if found is None else float(here @ found)
 
     reach = distance(place, after)
-    return interpolated_zero(place, along, (0.0, reach)) or interpolated_zero(place, along, (0.0, 2.0 * reach))
+    return interpolated_zero(place, along, (0.0, reach)) or interpolated_zero(
+        place, along, (0.0, 2.0 * reach)
+    )
