@@ -64,8 +64,8 @@ def continue_orbit(
 
     Steps are taken along the branch (pseudo-arclength), so that it may turn back at folds. Each orbit is
     corrected by the shortest Newton step of the state, the period and the parameter together, with the
-    derivatives of the run in all of them. The orbits keep their sequence of transitions: the branch ends
-    where a guard is touched without speed. The section moves along the orbit, so that no jump is near it.
+    derivatives of the run in all of them. A step is the next point if the corrections contract and are small
+    beside the step. The section moves along the orbit, so that no jump is near it.
 
     Parameters
     ----------
