@@ -34,6 +34,7 @@ CONTRACTION = 0.5
 NEGLIGIBLE = 1e-3
 # Relative step of the difference that gives the slope of a period that cannot be traced.
 STEP = 1e-5
+MOST_JUMPS = 100_000
 # A singular value of the scaled equations is zero if it is this share of the largest.
 ROUNDING = 1e-14
 
@@ -321,7 +322,6 @@ class Family:
         self, system: HybridSystem, mode: str, state: np.ndarray, span: tuple[float, float], most: int | None
     ) -> HybridArc:
         """A run with its tangent vectors, of ``most`` steps and jumps at most."""
-        limits = {} if most is None else {"max_jumps": most}
         solver = self.solver if most is None else attrs.evolve(self.solver, max_steps=most)
         try:
             return simulate(
@@ -332,7 +332,7 @@ class Family:
                 parameters=self.fixed,
                 solver=solver,
                 tangent=np.eye(system.tangent_dimension),
-                **limits,
+                max_jumps=MOST_JUMPS if most is None else most,
             )
         except ArgumentError as error:
             raise ArithmeticError from error
