@@ -35,9 +35,12 @@ NEAR_ONE = 1e-3
 
 ENDS = {
     "range": "the end of the range",
-    "closed": "the branch closes",
+    "closed": "its start: it is closed",
     "equilibrium": "a point, where the orbit has no size",
     "infinity": "an orbit that grows without bound",
+    "homoclinic": "an orbit whose period grows without bound",
+    "instant": "an orbit whose period becomes zero",
+    "family": "orbits that all have one value of the parameter",
     "most": "the limit of steps",
     "lost": "Newton's method finds no orbit farther on",
 }
@@ -61,8 +64,8 @@ def continue_orbit(
 
     Steps are taken along the branch (pseudo-arclength), so that it may turn back at folds. Each orbit is
     corrected by the shortest Newton step of the state, the period and the parameter together, with the
-    derivatives of the run in all of them. The orbits keep their sequence of transitions: the branch ends
-    where a guard is touched without speed. The section moves along the orbit, so that no jump is near it.
+    derivatives of the run in all of them. A step is the next point if the corrections contract and are small
+    beside the step. The section moves along the orbit, so that no jump is near it.
 
     Parameters
     ----------

@@ -12,6 +12,8 @@ from hybrid.orbits.continuation.route import Loop
 # The first orbit is this far from where the branches meet, in units of its size, or nearer by halves.
 DISTANCE = 0.02
 NEAREST = 1e-6
+# At half the distance the orbit is nearer by at least this factor, as one that begins there.
+SHRINKS = 0.75
 # Distance at which the parameter of a fold is compared with that at the fold.
 APART = 1e-3
 
@@ -30,13 +32,21 @@ def crossing(place: Place, times: int) -> Pass | None:
     one, other = np.linalg.svd(repeated.matrix)[2][-2:]
     direction = one * (other @ along) - other * (one @ along)
     direction /= np.linalg.norm(direction)
-    distance = DISTANCE
-    while distance > NEAREST:
+
+    def at(distance: float) -> tuple[Pass, float] | None:
         guess = orbit.loop.plus(distance * units * direction)
         found = repeated.family.corrected(guess, orbit, units, direction[None])
-        if found is not None:
-            return found[0]
+        if found is None:
+            return None
+        return found[0], float(np.linalg.norm((found[0].loop.flat - orbit.loop.flat) / units))
+
+    distance, made = DISTANCE, at(DISTANCE)
+    while distance > NEAREST:
         distance /= 2.0
+        nearer = at(distance)
+        if made is not None and nearer is not None and nearer[1] <= SHRINKS * made[1]:
+            return made[0]
+        made = nearer
     return None
 
 

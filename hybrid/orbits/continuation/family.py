@@ -29,8 +29,12 @@ ALONG = 1e-10
 # The corrections stop when they are this small.
 CONVERGED = 1e-12
 MOST_CORRECTIONS = 8
+# Each correction is at most this share of the one before it, or this share of how far an orbit may be.
+CONTRACTION = 0.5
+NEGLIGIBLE = 1e-3
 # Relative step of the difference that gives the slope of a period that cannot be traced.
 STEP = 1e-5
+MOST_JUMPS = 100_000
 # A singular value of the scaled equations is zero if it is this share of the largest.
 ROUNDING = 1e-14
 
@@ -134,13 +138,15 @@ class Family:
         wanted = [symbols[names.index(name)] for name in self.names]
         return expressed([derivative(expression, each) for each in wanted])
 
-    def around(self, loop: Loop) -> Pass | None:
-        """One pass from these unknowns; None if a stretch does not reach its end."""
+    def around(self, loop: Loop, most: int | None = None) -> Pass | None:
+        """One pass from these unknowns; None if a stretch does not end in so many steps or jumps."""
         if not np.all(np.isfinite(loop.flat)) or np.any(np.abs(np.diff(loop.times)) > 4.0 * abs(loop.period)):
             return None
         try:
             flows = tuple(
-                self.flow(stretch, loop.x[i], float(loop.times[i]), float(loop.times[i + 1]), loop.values)
+                self.flow(
+                    stretch, loop.x[i], float(loop.times[i]), float(loop.times[i + 1]), loop.values, most
+                )
                 for i, stretch in enumerate(self.route)
             )
             landings = tuple(
@@ -152,14 +158,22 @@ class Family:
         return Pass(self, loop, flows, landings)
 
     def corrected(
-        self, loop: Loop, anchor: Pass, units: np.ndarray, across: np.ndarray | None = None
+        self,
+        loop: Loop,
+        anchor: Pass,
+        units: np.ndarray,
+        across: np.ndarray | None = None,
+        reach: float = 1.0,
     ) -> tuple[Pass, int] | None:
         """The nearest orbit by the shortest Newton steps, and how many; None if there is none.
 
-        With ``across (r, m + k)``, directions of the scaled unknowns, no step has a part along them.
+        With ``across (r, m + k)``, directions of the scaled unknowns, no step has a part along them. An orbit
+        farther than ``reach`` from the first unknowns, in these units, or one that the steps do not contract
+        to, is another one. The passes take a few times the steps of the ``anchor`` at most.
         """
+        predicted, before, most = loop.flat, np.inf, anchor.steps_allowed
         for corrections in range(MOST_CORRECTIONS + 1):
-            found = self.around(loop)
+            found = self.around(loop, most)
             if found is None:
                 return None
             matrix, values = found.equations(anchor, units)
@@ -175,13 +189,23 @@ class Family:
             small = length <= (CLOSED if corrections == MOST_CORRECTIONS else CONVERGED)
             if small and np.all(np.abs(values) <= CLOSED):
                 return found, corrections
-            if length > 1.0:
-                return None
             loop = loop.plus(units * change)
+            away = float(np.abs((loop.flat - predicted) / units).max())
+            if away > reach or length > max(CONTRACTION * before, NEGLIGIBLE * reach):
+                return None
+            before = length
         return None
 
-    def flow(self, stretch: Stretch, x: np.ndarray, begin: float, end: float, values: np.ndarray) -> Flow:
-        """The motion of a stretch; ArithmeticError if it does not reach its end."""
+    def flow(
+        self,
+        stretch: Stretch,
+        x: np.ndarray,
+        begin: float,
+        end: float,
+        values: np.ndarray,
+        most: int | None = None,
+    ) -> Flow:
+        """The motion of a stretch; ArithmeticError if it does not end in so many steps or jumps."""
         n, state = len(x), self.extended_state(np.append(x, stretch.counters), values)
         mode = self.extended.mode_index(stretch.mode)
         last_mode = self.extended.mode_index(stretch.end_mode)
@@ -192,7 +216,7 @@ class Family:
             return Flow(None, moved, np.eye(n, n + len(values)), first_rate, last_rate, stretch.counters)
         forwards = end > begin
         system = restricted(self.extended, stretch.mode, stretch.within, backwards=not forwards)
-        arc = self._run(system, stretch.mode, state, (begin, end) if forwards else (-begin, -end), True)
+        arc = self._run(system, stretch.mode, state, (begin, end) if forwards else (-begin, -end), most)
         if not arc.status.ok or str(arc.mode[-1]) != stretch.end_mode:
             raise ArithmeticError
         assert arc.fundamental is not None
@@ -295,8 +319,10 @@ class Family:
         return np.delete(found, np.s_[self.n : len(found) - 1])
 
     def _run(
-        self, system: HybridSystem, mode: str, state: np.ndarray, span: tuple[float, float], tangents: bool
+        self, system: HybridSystem, mode: str, state: np.ndarray, span: tuple[float, float], most: int | None
     ) -> HybridArc:
+        """A run with its tangent vectors, of ``most`` steps and jumps at most."""
+        solver = self.solver if most is None else attrs.evolve(self.solver, max_steps=most)
         try:
             return simulate(
                 system,
@@ -304,8 +330,9 @@ class Family:
                 span,
                 mode=mode,
                 parameters=self.fixed,
-                solver=self.solver,
-                tangent=np.eye(system.tangent_dimension) if tangents else None,
+                solver=solver,
+                tangent=np.eye(system.tangent_dimension),
+                max_jumps=MOST_JUMPS if most is None else most,
             )
         except ArgumentError as error:
             raise ArithmeticError from error

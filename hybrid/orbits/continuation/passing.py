@@ -17,6 +17,9 @@ from hybrid.system.periodicity import closed_change
 CLOSED = 1e-10
 # Places of a stretch at which the size of the states is taken.
 LOOKED_AT = 17
+# A stretch of a neighbour may take so many times the steps of the longest, and so many besides.
+MORE_STEPS = 10
+FEWEST_STEPS = 1000
 # Eigenvalues of one matrix are wrong by its norm times rounding; above this they come from its factors.
 BLURRED = 1e-9
 
@@ -103,6 +106,12 @@ class Pass:
         shares = np.linspace(0.0, 1.0, LOOKED_AT)
         states = [flow.at(shares) for flow in self.flows if flow.arc is not None]
         return np.asarray(np.abs(np.concatenate([self.loop.x, *states])).max(axis=0))
+
+    @property
+    def steps_allowed(self) -> int:
+        """Steps that one stretch of a neighbour may take: more mean that it is no neighbour."""
+        taken = [flow.arc.steps + flow.arc.rejected for flow in self.flows if flow.arc is not None]
+        return FEWEST_STEPS + MORE_STEPS * max(taken, default=0)
 
     @property
     def parted(self) -> Pass:

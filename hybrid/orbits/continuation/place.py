@@ -22,6 +22,8 @@ from hybrid.transform.aged import aged, with_age
 
 # A step may turn by this angle (its cosine).
 LEAST_COSINE = 0.95
+# A step is halved down to this length.
+SHORTEST_STEP = 1e-7
 # A run jumps where the equations say so if the times agree to this share of the period.
 SAME_TIME = 1e-6
 # Stretches are divided anew if errors grow by this much more along one of them than they may.
@@ -31,6 +33,8 @@ SHARES = (-1.0, -0.6, -0.25, 0.25, 0.6, 1.0)
 # Two of these polynomials agree to this, in units of the unknowns.
 AGREE = 1e-12
 LOOSE = 1e-7
+# A zero between two places may lie outside of them by this share of their distance.
+BESIDE = 1e-3
 MOST_ROUNDS = 5
 
 
@@ -48,12 +52,15 @@ class Place:
         Units ``(k,)`` of the parameters.
     bend
         Derivative ``(m + k,)`` of the first tangent along the branch, as far as it is known.
+    firm
+        Whether the equations hold the orbit on the branch: not where other orbits are beside it.
     """
 
     orbit: Pass
     tangents: np.ndarray
     sizes: np.ndarray
     bend: np.ndarray | float = 0.0
+    firm: bool = True
 
     @property
     def family(self) -> Family:
@@ -82,10 +89,11 @@ class Place:
 
     def step(self, lengths: np.ndarray) -> tuple[Place, int] | None:
         """The place at distances ``(k,)`` along the tangents, and how many corrections it took; or None."""
-        units = self.units
+        units, length = self.units, float(np.abs(lengths).max())
         guess = self.orbit.loop.plus(units * (lengths @ self.tangents + 0.5 * lengths[0] ** 2 * self.bend))
         try:
-            made = self.family.corrected(guess, self.orbit, units, self.tangents)
+            reach = max(length / 2.0, SHORTEST_STEP) if self.firm else 1.0
+            made = self.family.corrected(guess, self.orbit, units, self.tangents, reach)
         except ArgumentError:
             return None
         if made is None:
@@ -105,15 +113,29 @@ def distance(place: Place, other: Place) -> float:
 
 
 def passes_by(start: Place, before: Place, after: Place) -> bool:
-    """Whether a step passes the start of a walk."""
+    """Whether a step passes the start of a walk, whole turns of angles and whole forcing periods aside."""
     if after.family.route != start.family.route or before.family.route != start.family.route:
         return False
     units, first = start.units, start.orbit.loop.flat
-    one, other = ((each.orbit.loop.flat - first) / units for each in (before, after))
+    again = first + _same_again(start, after)
+    one, other = ((each.orbit.loop.flat - again) / units for each in (before, after))
     chord = other - one
     length = float(np.linalg.norm(chord))
     share = -one @ chord / length**2 if length > 0.0 else -1.0
     return bool(0.0 <= share <= 1.0 and np.linalg.norm(one + share * chord) < 0.1 * length)
+
+
+def _same_again(start: Place, after: Place) -> np.ndarray:
+    """Whole turns, and whole forcing periods or any time without forcing, from one place to another."""
+    first, last, family = start.orbit.loop, after.orbit.loop, start.family
+    turns = family.system.turn_lengths[: family.n]
+    moved, late = np.mean(last.x - first.x, axis=0), float(np.mean(last.times - first.times))
+    around = np.where(turns > 0.0, np.round(moved / np.where(turns > 0.0, turns, 1.0)) * turns, 0.0)
+    if family.forced:
+        forcing = family.period(first.values) / family.periods
+        late = round(late / forcing) * forcing
+    times = np.full(len(first.times), late)
+    return np.concatenate([np.tile(around, len(first.x)), times, np.zeros(len(first.values))])
 
 
 def zero_between(place: Place, after: Place, function: Callable[[Place], float]) -> Place | None:
@@ -170,7 +192,7 @@ def interpolated_zero(
                 heights.append(height)
         # A measure that takes a value twice does not tell the places apart.
         if len(places) < 3 or len(set(heights)) < len(heights):
-            return best
+            break
         unknowns = np.array([each.orbit.loop.flat for each in places])
         ends = [_at_zero(np.array(heights)[part], unknowns[part]) for part in (slice(None), slice(1, None))]
         units = place.units
@@ -188,7 +210,7 @@ def interpolated_zero(
         return None
     orbit = best.family.around(best.orbit.loop)
     found = best if orbit is None else attrs.evolve(best, orbit=orbit)
-    beside = high - low
+    beside = BESIDE * (high - low)
     return found if low - beside <= distance(place, found) <= high + beside else None
 
 
@@ -210,7 +232,7 @@ def place_of(orbit: Pass, onward: np.ndarray, sizes: np.ndarray) -> Place | None
     # There are more directions than parameters where orbits come in families of their own.
     null = vectors[min(int(np.sum(values > ROUNDING * values[0])), len(matrix.T) - len(sizes)) :]
     left, _, right = np.linalg.svd(onward @ null.T, full_matrices=False)
-    return Place(orbit, left @ right @ null, sizes)
+    return Place(orbit, left @ right @ null, sizes, firm=bool(values[-1] > LOOSE * values[0]))
 
 
 def begun(family: Family, loop: Loop, sizes: np.ndarray) -> Place | None:

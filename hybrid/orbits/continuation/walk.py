@@ -9,6 +9,7 @@ import numpy as np
 
 from hybrid.orbits.continuation.change import Change, located
 from hybrid.orbits.continuation.place import (
+    SHORTEST_STEP,
     Place,
     distance,
     interpolated_zero,
@@ -23,13 +24,19 @@ from hybrid.orbits.continuation.smooth import TESTS, branch_point, halves, told
 # Lengths of steps along the branch, in units of the sizes of the orbit and of the range of the parameter.
 FIRST_STEP = 0.01
 LONGEST_STEP = 0.05
-SHORTEST_STEP = 1e-7
 # A step is lengthened after few corrections.
 FEW_CORRECTIONS = 3
 LONGER = 1.5
 # An orbit that is larger than the first one by this factor, the square root of rounding, grows without bound.
 UNBOUNDED = 2.0**26
 NOTHING = 1e-12
+# Two halves of an orbit are the same if they differ by this share of its size.
+SAME_HALVES = 1e-7
+# Along the last part of a walk, of this length, the parameter stands still if it changes by this share of its
+# range. The period grows without bound, or becomes zero, if it changes by this factor there.
+LAST_PART = 0.5
+STILL = 1e-8
+GROWN = 1.05
 # Another branch crosses near a place where the equations are this near to singular; a step that ends there is
 # taken longer.
 CROSSED = 3e-3
@@ -51,6 +58,7 @@ class Event:
 def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | Event | str]:
     """Places along a branch with the events between them; the last item is why it ends."""
     length, start, passed = FIRST_STEP, place, list[tuple[tuple[Route, ...], float]]()
+    trace: list[tuple[float, float, float]] = []
     for _ in range(most):
         made = place.step(np.array([length]))
         if made is None:
@@ -95,9 +103,10 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
         if _turned(place, after):
             yield "equilibrium"
             return
-        half = _halved(place, after)
-        if half is not None:
-            yield Event("flip", half, "the orbit has half the period: this branch begins here")
+        if _comes_to_its_half(place, after):
+            half = _halved(place, after)
+            if half is not None and low <= half.value <= high:
+                yield Event("flip", half, "the orbit has half the period: this branch begins here")
             yield "flip"
             return
         yield from _between(place, after)
@@ -108,10 +117,30 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
         if place is not start and passes_by(start, place, after):
             yield "closed"
             return
+        trace.append((distance(place, after), after.value, after.orbit.loop.period))
+        why = _stands_still(trace, after)
+        if why:
+            yield why
+            return
         if corrections <= FEW_CORRECTIONS:
             length = min(LONGEST_STEP, LONGER * length)
         place = refined(after)
     yield "most"
+
+
+def _stands_still(trace: list[tuple[float, float, float]], place: Place) -> str:
+    """Why a branch ends along whose last part the parameter stands still; empty if it does not.
+
+    The trace has the length of each step, with the parameter and the period after it.
+    """
+    while sum(length for length, *_ in trace[1:]) > LAST_PART:
+        trace.pop(0)
+    lengths, values, periods = np.array(trace).T
+    if lengths.sum() < LAST_PART or np.ptp(values) > STILL * float(place.sizes[0]):
+        return ""
+    if place.family.forced or periods[0] <= GROWN * periods[-1] <= GROWN**2 * periods[0]:
+        return "family"
+    return "homoclinic" if periods[-1] > periods[0] else "instant"
 
 
 def _is_crossed(place: Place) -> bool:
@@ -156,14 +185,24 @@ def _turned(place: Place, after: Place) -> bool:
     return bool(rates[0] @ rates[1] < 0.0)
 
 
-def _halved(place: Place, after: Place) -> Place | None:
-    """The place between two where the orbit becomes one of half the period."""
+def _comes_to_its_half(place: Place, after: Place) -> bool:
+    """Whether an orbit becomes one of half the period, or a step ends on the branch of these."""
     here, there = halves(place.orbit), halves(after.orbit)
-    if here is None or there is None or not here @ there < 0.0:
-        return None
+    if here is None or there is None or np.linalg.norm(here) <= SAME_HALVES:
+        return False
+    return bool(here @ there < 0.0 or np.linalg.norm(there) <= SAME_HALVES)
+
+
+def _halved(place: Place, after: Place) -> Place | None:
+    """The place near two where the orbit becomes one of half the period."""
+    here = halves(place.orbit)
+    assert here is not None
 
     def along(each: Place) -> float:
         found = halves(each.orbit)
         return 0.0 if found is None else float(here @ found)
 
-    return interpolated_zero(place, along, (0.0, distance(place, after)))
+    reach = distance(place, after)
+    return interpolated_zero(place, along, (0.0, reach)) or interpolated_zero(
+        place, along, (0.0, 2.0 * reach)
+    )

@@ -165,7 +165,7 @@ def test_an_isola_closes():
         ],
     )
     branch = continue_orbit(periodic_orbit(system, (0.4, 0.9), period=1.0), "a", (-2.0, 2.0))
-    assert "closes" in branch.status.message
+    assert "closed" in branch.status.message
     assert sorted(each.value for each in branch.bifurcations) == pytest.approx([-1.0, 1.0], abs=1e-10)
     np.testing.assert_allclose(branch.parameter**2 + branch.x0[:, 1] ** 2, 1.0, rtol=1e-10)
 

@@ -1,0 +1,186 @@
+"""A branch is one curve: each step is the next point of it, and each end has a name."""
+
+import numpy as np
+import pytest
+
+from hybrid import (
+    Every,
+    Guard,
+    HybridSystem,
+    Mode,
+    Reset,
+    Transition,
+    continue_orbit,
+    from_equations,
+    periodic_orbit,
+    simulate,
+)
+
+
+def clocked(state, image, parameters, **options):
+    """A map of the state, once per unit of time."""
+    return HybridSystem(
+        state=state,
+        parameters=parameters,
+        period=1.0,
+        modes=[Mode("wait", lambda t, x, p: (0.0,) * len(state))],
+        transitions=[Transition("wait", "wait", Every(1.0), Reset(image))],
+        **options,
+    )
+
+
+@pytest.mark.parametrize("span", [(-0.2, 0.2), (-0.9, 0.9), (-0.9, 0.3)])
+def test_a_branch_does_not_go_over_a_jump_of_a_reset(span):
+    """A leaky sigma-delta modulator: the orbit of two points exists for ``abs(u) < (1 - a) / (1 + a)``."""
+    modulator = clocked(
+        ("x",),
+        lambda t, x, p: (p.a * x.x + p.u + np.where(x.x < 0, 1.0, -1.0),),
+        {"a": 0.8, "u": 0.02},
+    )
+    branch = continue_orbit(periodic_orbit(modulator, (0.65,), periods=2), "u", span)
+    np.testing.assert_allclose(branch.parameter[[0, -1]], [-1 / 9, 1 / 9], atol=1e-4)
+
+
+def test_a_tongue_closes_after_a_turn_of_the_phase():
+    """``v' = I`` up to ``1 + k sin(2 pi t)``: a spike per period for ``abs(I - 1) <= k``, at every phase."""
+    neuron = HybridSystem(
+        state=("v",),
+        parameters={"I": 1.02, "k": 0.1},
+        period=1.0,
+        modes=[Mode("up", lambda t, x, p: (p.I,))],
+        transitions=[
+            Transition(
+                "up",
+                "up",
+                Guard(lambda t, x, p: x.v - 1 - p.k * np.sin(2 * np.pi * t), +1),
+                Reset(lambda t, x, p: (0.0,)),
+            )
+        ],
+    )
+    orbit = periodic_orbit(neuron, simulate(neuron, (0.0,), (0.0, 60.0)).x[-1])
+    branch = continue_orbit(orbit, "I", (0.5, 1.6))
+    assert "closed" in branch.status.message
+    assert sorted(each.value for each in branch.bifurcations) == pytest.approx([0.9, 1.1], abs=1e-9)
+
+
+def test_a_curve_of_angles_closes_after_a_turn():
+    """The dissipative standard map has fixed points for ``W = m - K sin(f)``."""
+    b, K, m = 0.3, 0.8, 2 * np.pi * 0.7
+    standard = clocked(
+        ("f", "y"),
+        lambda t, x, p: (
+            x.f + p.b * x.y + p.W + p.K * np.sin(x.f),
+            p.b * x.y + p.W + p.K * np.sin(x.f),
+        ),
+        {"b": b, "K": K, "W": m + 0.1},
+        angles={"f": 2 * np.pi},
+    )
+    branch = continue_orbit(periodic_orbit(standard, (3.0, 6.28)), "W", (2.0, 7.0))
+    assert "closed" in branch.status.message
+    assert sorted(each.value for each in branch.bifurcations) == pytest.approx([m - K, m + K], abs=1e-8)
+
+
+def test_a_wide_span_gives_what_narrow_ones_give():
+    """A gear pair with backlash and a bearing, through a grazing and four folds."""
+
+    def pair(t, s, p):
+        d = s.x - s.y
+        gap = np.where(d > 1, d - 1, np.where(d < -1, d + 1, 0.0))
+        mesh = 2 * p.z * (s.u - s.w) + (1 + p.eps * np.cos(p.Om * t)) * gap
+        force = p.Fm + p.Fa * np.cos(p.Om * t)
+        return s.u, force - mesh, s.w, p.m * mesh - 2 * p.zb * s.w - p.kb * s.y
+
+    values = {"z": 0.05, "eps": 0.2, "Om": 0.9, "Fm": 0.1, "Fa": 0.05, "m": 0.3, "zb": 0.05, "kb": 1.5}
+    gear = from_equations(
+        pair, state=("x", "u", "y", "w"), period=lambda p: 2 * np.pi / p.Om, parameters=values
+    )
+    settled = simulate(gear, (1.1, 0, 0, 0), (0, 300 * 2 * np.pi / 0.9))
+    orbit = periodic_orbit(gear, settled.x[-1], mode=str(settled.mode[-1]))
+    spans = ((0.3, 0.9), (0.8, 1.6), (0.3, 1.6))
+    left, right, whole = (continue_orbit(orbit, "Om", span) for span in spans)
+    assert left.status.ok
+    assert right.status.ok
+    assert whole.status.ok
+    for part, low, high in ((left, 0.3, 0.9), (right, 0.9, 1.6)):
+        found, wanted = (
+            sorted((each.kind, each.value) for each in branch.bifurcations if low < each.value < high)
+            for branch in (part, whole)
+        )
+        assert [kind for kind, _ in found] == [kind for kind, _ in wanted]
+        np.testing.assert_allclose([at for _, at in found], [at for _, at in wanted], rtol=1e-7)
+
+
+def test_a_period_that_grows_without_bound_ends_a_branch():
+    """``x -> e + x**2`` at a saddle: the period is ``-log(x)``, and infinite at ``e = 0``."""
+    saddle = HybridSystem(
+        state=("x", "y"),
+        parameters={"e": 0.2},
+        modes=[Mode("f", lambda t, x, p: (x.x, -2.0 * x.y))],
+        transitions=[
+            Transition("f", "f", Guard(lambda t, x, p: x.x - 1, +1), Reset(lambda t, x, p: (x.y + p.e, 1.0)))
+        ],
+    )
+    x = (1 - np.sqrt(0.2)) / 2
+    branch = continue_orbit(periodic_orbit(saddle, (x, 1.0), period=-np.log(x)), "e", (-0.5, 0.5))
+    assert "an orbit whose period grows without bound" in branch.status.message
+    assert abs(branch.parameter[0]) < 1e-6
+    np.testing.assert_allclose(branch.period, -np.log(branch.x0[:, 0] / branch.x0[:, 0]) + branch.period)
+    assert [each.kind for each in branch.bifurcations] == ["fold"]
+    assert branch.bifurcations[0].value == pytest.approx(0.25, abs=1e-9)
+
+
+def test_a_family_at_one_value_of_the_parameter_is_named_once():
+    """At a traffic light, every queue of 15 cars or more is periodic where half of the cars arrive."""
+    light = HybridSystem(
+        state=("n",),
+        parameters={"lam": 0.3, "mu": 1.0, "g": 30.0, "T": 60.0},
+        modes=[
+            Mode("red", lambda t, x, p: (p.lam,)),
+            Mode("green", lambda t, x, p: (p.lam - p.mu,)),
+            Mode("free", lambda t, x, p: (0.0,)),
+        ],
+        transitions=[
+            Transition("red", "green", Every("T"), name="go"),
+            Transition("green", "free", Guard(lambda t, x, p: x.n, -1), name="empty"),
+            Transition("green", "red", Every("T", offset="g"), name="stop"),
+            Transition("free", "red", Every("T", offset="g"), name="stop free"),
+        ],
+        start="green",
+        period=lambda p: p.T,
+    )
+    branch = continue_orbit(periodic_orbit(light, (3.0,), mode="green"), "lam", (0.05, 0.6))
+    assert branch.status.ok
+    assert "fold" not in [each.kind for each in branch.bifurcations]
+    assert "orbits that all have one value of the parameter" in branch.status.message
+    assert branch.parameter.max() == pytest.approx(0.5, abs=1e-9)
+
+
+def test_what_is_listed_lies_in_the_span_on_an_orbit_that_closes():
+    """A driven mass carries a free mass between two walls."""
+
+    def swap(t, x, p):
+        mean, rel = (x.v + p.mu * x.u) / (1 + p.mu), -p.e * (x.u - x.v)
+        return {"v": mean - p.mu * rel / (1 + p.mu), "u": mean + rel / (1 + p.mu)}
+
+    damper = HybridSystem(
+        state=("x", "y", "v", "u"),
+        parameters={"z": 0.02, "A": 0.1, "w": 1.0, "mu": 0.1, "e": 0.7, "d": 1.0},
+        modes=[Mode("free", lambda t, x, p: (x.v, x.u, p.A * np.cos(p.w * t) - 2 * p.z * x.v - x.x, 0.0))],
+        transitions=[
+            Transition(
+                "free", "free", Guard(lambda t, x, p: x.y - x.x - p.d / 2, +1), Reset(swap), name="right"
+            ),
+            Transition(
+                "free", "free", Guard(lambda t, x, p: x.y - x.x + p.d / 2, -1), Reset(swap), name="left"
+            ),
+        ],
+        period=lambda p: 2 * np.pi / p.w,
+    )
+    settled = simulate(damper, (0.0, 0.0, 0.1, 0.5), (0.0, 300 * 2 * np.pi))
+    orbit = periodic_orbit(damper, settled.x[-1], periods=2)
+    branch = continue_orbit(orbit, "w", (0.97, 1.03))
+    assert branch.status.ok
+    assert len(branch.bifurcations) > 0
+    for each in branch.bifurcations:
+        assert 0.97 <= each.value <= 1.03
+        assert each.orbit.residual < 1e-6
