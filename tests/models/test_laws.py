@@ -29,7 +29,7 @@ RUNS = {
     ),
     "battery_cell": (
         models.battery_cell(),
-        {"states": {"s": (0.05, 0.5), "v1": (0.0, 0.1)}, "t_span": (0.0, 130.0)},
+        {"states": {"s": (0.05, 0.15), "v1": (0.0, 0.1)}, "t_span": (0.0, 130.0)},
     ),
     "bilinear_oscillator": (models.bilinear_oscillator(), {"t_span": (0.0, 7.0)}),
     "boost_converter": (
