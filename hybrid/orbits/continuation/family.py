@@ -163,7 +163,7 @@ class Family:
         anchor: Pass,
         units: np.ndarray,
         across: np.ndarray | None = None,
-        reach: float = 1.0,
+        reach: float = np.inf,
     ) -> tuple[Pass, int] | None:
         """The nearest orbit by the shortest Newton steps, and how many; None if there is none.
 
@@ -191,7 +191,7 @@ class Family:
                 return found, corrections
             loop = loop.plus(units * change)
             away = float(np.abs((loop.flat - predicted) / units).max())
-            if away > reach or length > max(CONTRACTION * before, NEGLIGIBLE * reach):
+            if length > 1.0 or away > reach or length > max(CONTRACTION * before, NEGLIGIBLE * reach):
                 return None
             before = length
         return None

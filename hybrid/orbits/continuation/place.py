@@ -92,7 +92,7 @@ class Place:
         units, length = self.units, float(np.abs(lengths).max())
         guess = self.orbit.loop.plus(units * (lengths @ self.tangents + 0.5 * lengths[0] ** 2 * self.bend))
         try:
-            reach = max(length / 2.0, SHORTEST_STEP) if self.firm else 1.0
+            reach = max(length / 2.0, SHORTEST_STEP) if self.firm else np.inf
             made = self.family.corrected(guess, self.orbit, units, self.tangents, reach)
         except ArgumentError:
             return None

@@ -107,6 +107,7 @@ class TestDense:
         with pytest.raises(hybrid.ArgumentError, match=r"t must lie in the run, \[0.0, .*\]; got"):
             arc(t)
 
+    @pytest.mark.as_given
     def test_of_a_run_that_ends_at_a_jump(self):
         whole = simulate(BALL, (1.0, 0.0), (0.0, 3.0), solver=TIGHT)
         t = whole.jumps[1].t
@@ -187,7 +188,8 @@ class TestSamples:
         np.testing.assert_allclose(arc.x, [ball_exact(t) for t in arc.t], atol=1e-12)
 
     @pytest.mark.as_given
-    def test_exactly_at_events(self, ride):
+    def test_exactly_at_events(self):
+        ride = simulate(OSCILLATOR, (0.0, 0.0), (0.0, 60.0), solver=TIGHT)
         times = ride.jumps.t
         arc = simulate(OSCILLATOR, (0.0, 0.0), (0.0, 60.0), samples=times, keep_jumps=True, solver=TIGHT)
         np.testing.assert_allclose(arc.x, ride.jumps.x_plus, atol=1e-14)
@@ -195,7 +197,8 @@ class TestSamples:
         np.testing.assert_array_equal(arc.jumps.t, times)
 
     @pytest.mark.as_given
-    def test_at_an_event_that_ends_the_run(self, ride):
+    def test_at_an_event_that_ends_the_run(self):
+        ride = simulate(OSCILLATOR, (0.0, 0.0), (0.0, 60.0), solver=TIGHT)
         for jump in ride.jumps[:4]:
             arc = simulate(OSCILLATOR, (0.0, 0.0), (0.0, jump.t), samples=[jump.t], solver=TIGHT)
             np.testing.assert_allclose(arc.x[-1], jump.x_plus, atol=1e-12)
