@@ -5,6 +5,7 @@ import pytest
 
 import models
 from hybrid import Every, Guard, HybridSystem, Mode, Reset, Transition, continue_orbit, periodic_orbit
+from tests.hybrid.orbits.traffic import traffic_light
 
 OSCILLATOR = models.impact_oscillator()
 FORCED = periodic_orbit(OSCILLATOR, (0.9, 1.0))
@@ -157,24 +158,7 @@ def test_orbits_of_a_converter_are_starts_although_a_clock_ticks_at_their_point(
 
 def test_a_state_that_is_zero_for_a_time_is_controlled():
     """A queue at a traffic light grows while the light is red, and is empty before it turns red again."""
-    light = HybridSystem(
-        state=("n",),
-        parameters={"arrive": 0.3, "leave": 1.0, "green": 30.0, "T": 60.0},
-        modes=[
-            Mode("red", lambda t, x, p: (p.arrive,)),
-            Mode("green", lambda t, x, p: (p.arrive - p.leave,)),
-            Mode("free", lambda t, x, p: (0.0,)),
-        ],
-        transitions=[
-            Transition("red", "green", Every("T"), name="go"),
-            Transition("green", "free", Guard(lambda t, x, p: x.n, -1), name="empty"),
-            Transition("green", "red", Every("T", offset="green"), name="stop"),
-            Transition("free", "red", Every("T", offset="green"), name="stop free"),
-        ],
-        start="green",
-        period=lambda p: p.T,
-    )
-    orbit = periodic_orbit(light, (3.0,), mode="green")
+    orbit = periodic_orbit(traffic_light(), (3.0,), mode="green")
     assert orbit.status.ok
     assert orbit.x0[0] == pytest.approx(0.3 * 30.0, rel=1e-9)
     assert set(orbit.transitions) == {"go", "empty", "stop free"}
