@@ -18,6 +18,7 @@ from hybrid.orbits.continuation.route import LARGEST_GROWTH, Loop, Stretch, rout
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver
+from hybrid.system.periodicity import whole_turns
 from hybrid.transform.aged import aged, with_age
 
 # A step may turn by this angle (its cosine).
@@ -130,7 +131,7 @@ def _same_again(start: Place, after: Place) -> np.ndarray:
     first, last, family = start.orbit.loop, after.orbit.loop, start.family
     turns = family.system.turn_lengths[: family.n]
     moved, late = np.mean(last.x - first.x, axis=0), float(np.mean(last.times - first.times))
-    around = np.where(turns > 0.0, np.round(moved / np.where(turns > 0.0, turns, 1.0)) * turns, 0.0)
+    around = turns * whole_turns(moved, turns)
     if family.forced:
         forcing = family.period(first.values) / family.periods
         late = round(late / forcing) * forcing
