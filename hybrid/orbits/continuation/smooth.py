@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import Place
 
 Test = Callable[[Place], float]
@@ -65,12 +64,3 @@ def told(kind: str, place: Place) -> str:
     if kind == "fold":
         return "the branch turns back in the parameter: a multiplier is 1"
     return "a multiplier is 1, and another branch crosses"
-
-
-def halves(orbit: Pass) -> np.ndarray | None:
-    """How far the second half of an orbit is from the first ``(S n / 2,)``; None for a route of one half."""
-    route, x = orbit.family.route, orbit.loop.x
-    half = len(route) // 2
-    if len(route) % 2 or route[:half] != route[half:]:
-        return None
-    return np.asarray((x[half:] - x[:half]).ravel() / np.tile(orbit.scale, half))
