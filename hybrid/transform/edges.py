@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import attrs
 
+from hybrid.expression.graph import contains
 from hybrid.expression.nodes import Expression
+from hybrid.expression.switches import SWITCHING
 from hybrid.expression.tracing import TraceError, model_symbols, trace
 from hybrid.system.elements import Transition
 from hybrid.system.functions import WholeReset
@@ -35,6 +37,12 @@ class Outgoing:
         """A transition of a system with these variables."""
         guard, reset = _guard(transition, variables), _reset(transition, variables)
         return cls(index, transition, guard, reset)
+
+
+def switches(transition: Transition, variables: Variables) -> bool:
+    """Whether a reset has a kink or a jump inside, which :func:`split` makes a condition."""
+    entries = _reset(transition, variables)
+    return entries is not None and any(contains(entry, SWITCHING) for entry in entries)
 
 
 def _guard(transition: Transition, variables: Variables) -> Expression | None:

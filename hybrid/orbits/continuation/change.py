@@ -195,8 +195,10 @@ def located(place: Place, after: Place) -> Change | None:
             far = made[0]
         if number % HALVINGS != HALVINGS - 1:
             continue
-        for found, key in _explained(base, near, far):
-            return _simplest(Change(found, key, base, _onward(near, found, key)))
+        # The nearer place may be the very one where a measure is zero, and then has no sign.
+        for real in dict.fromkeys((near, base)):
+            for found, key in _explained(real, near, far):
+                return _simplest(Change(found, key, real, _onward(near, found, key)))
         base = near
     keys = changed(near.orbit, far.orbit)
     # What jumps has no zero: it is between two places that are the same to rounding.
@@ -226,7 +228,7 @@ def _simplest(change: Change) -> Change:
 def _explained(base: Place, near: Place, far: Place) -> Iterator[tuple[Place, Key]]:
     """Measures that are zero between two places, each with the place where it is.
 
-    The nearer one may have it zero: signs are compared with those at a real place ``base`` before it.
+    They have another sign at a real place ``base``, the nearer one or one before it.
     """
     ahead = distance(base, far)
     for key in changed(base.orbit, far.orbit):
@@ -246,11 +248,10 @@ def _onward(near: Place, at: Place, key: Key) -> Onward:
     """What comes beyond: the system is asked which other ways it goes from states around the orbit there."""
     slope = np.sign(near.tangents[0, -1])
     known = Onward(None, ([], []), None, None, True)
-    tried = {at.family.route}
     for farther in FARTHER:
         for asked in _asked(near, at, key, farther):
             family, first, jumps, stretch = asked
-            if family.route in tried:
+            if family.route == at.family.route:
                 continue
             more = len(jumps[1]) >= len(jumps[0])
             known = Onward(None, jumps, first if more else near.orbit, stretch, True)
@@ -264,7 +265,6 @@ def _onward(near: Place, at: Place, key: Key) -> Onward:
             if found is not None and not is_repeated(found.orbit) > is_repeated(at.orbit):
                 same_way = bool(np.sign(found.tangents[0, -1]) == slope)
                 return attrs.evolve(known, place=found, same_way=same_way)
-            tried.add(family.route)
     return known
 
 

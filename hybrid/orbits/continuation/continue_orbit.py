@@ -25,6 +25,7 @@ from hybrid.solvers import Solver, Taylor
 from hybrid.status import SUCCESS, Status, StatusCode
 from hybrid.system.entries import has_age
 from hybrid.transform.aged import original_of
+from hybrid.transform.edges import switches
 
 Item = Place | Event
 
@@ -40,6 +41,7 @@ ENDS = {
     "infinity": "an orbit that grows without bound",
     "homoclinic": "an orbit whose period grows without bound",
     "instant": "an orbit whose period becomes zero",
+    "chatter": "an orbit whose chatter becomes incomplete",
     "family": "orbits that all have one value of the parameter",
     "most": "the limit of steps",
     "lost": "Newton's method finds no orbit farther on",
@@ -122,10 +124,10 @@ def continue_orbit(
     progress = None if progress is None else arguments.flag("progress", progress)
     method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
     with CTRL_C, progress_bar(None, "Branch", progress, "orbit") as bar:
-        found, why, isolated = _branch(orbit, parameter, low, high, method, most, bar)
+        found, why, isolated, advice = _branch(orbit, parameter, low, high, method, most, bar)
         if CTRL_C.is_set():
             return attrs.evolve(found, status=interrupted_status("the orbits so far"))
-    status = _status(why)
+    status = _status(why, advice)
     order = next((found.orbit(i).status for i in (0, -1) if not found.orbit(i).status.ok), None)
     if status.ok and order is not None:
         status = attrs.evolve(order, message=f"{status.message} {order.message}")
@@ -136,18 +138,33 @@ def continue_orbit(
 
 def _branch(
     orbit: PeriodicOrbit, name: str, low: float, high: float, solver: Solver, most: int, bar: Progress
-) -> tuple[Branch, list[str], bool]:
-    """The branch both ways, why it ends at either end, and whether its first orbit is isolated."""
+) -> tuple[Branch, list[str], bool, str]:
+    """The branch both ways, why it ends, whether its first orbit is isolated, and advice if it is lost."""
     begin = place_on(orbit, (name,), np.array([high - low]), solver)
     points = points_of(orbit, begin)
     items: list[Item] = [begin]
     why: list[str] = []
+    advice = ""
     for sign in (-1.0, 1.0):
         items = items[::-1]
         why.append(_walked(attrs.evolve(begin, tangents=sign * begin.tangents), low, high, most, items, bar))
+        if why[-1] == "lost":
+            advice = _advice(next(item for item in reversed(items) if isinstance(item, Place)))
         if why[-1] in ("closed", "interrupted"):
             break
-    return branch_of(items, points), why, not _is_one_of_many(begin)
+    return branch_of(items, points), why, not _is_one_of_many(begin), advice
+
+
+def _advice(place: Place) -> str:
+    """What to do where Newton's method finds no orbit beyond a place."""
+    system = place.family.system
+    for name in dict.fromkeys(name for stretch in place.family.route for name in stretch.fired):
+        if switches(system.transitions[system.transition_index(name)], system.variables):
+            return (
+                f"The reset of {name!r} has a kink or a jump inside: continue an orbit of split(system), "
+                "where that is a transition."
+            )
+    return "Tighten the tolerances of solver=, or continue from the last orbit."
 
 
 def _is_one_of_many(place: Place) -> bool:
@@ -318,12 +335,12 @@ def _side(coefficient: float) -> str:
     return "larger" if coefficient > 0.0 else "smaller"
 
 
-def _status(why: list[str]) -> Status:
+def _status(why: list[str], advice: str) -> Status:
     told = " and at ".join(ENDS.get(each, _a(each)) for each in dict.fromkeys(why))
     if not {"lost", "most"} & set(why):
         return attrs.evolve(SUCCESS, message=f"The branch ends at {told}.")
     return Status(
         StatusCode.NOT_CONVERGED,
         f"The branch ends at {told}.",
-        "Tighten the tolerances of solver=, raise max_steps, or continue from the last orbit.",
+        advice or "Raise max_steps, or continue from the last orbit.",
     )

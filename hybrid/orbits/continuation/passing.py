@@ -219,7 +219,9 @@ class Pass:
         """The tangent map ``(n, n)`` of each stretch and the jumps at its end, at fixed times."""
         n = self.loop.x.shape[1]
         pairs = zip(self.saltations, self.flows, strict=True)
-        found = [saltation @ flow.slopes[:, :n] for saltation, flow in pairs]
+        # Where a guard is touched a saltation matrix has no bound.
+        with np.errstate(all="ignore"):
+            found = [saltation @ flow.slopes[:, :n] for saltation, flow in pairs]
         if all(landing is None for landing in self.landings):
             found[-1] = self.onto_its_surface @ found[-1]
         return found
@@ -250,8 +252,9 @@ class Pass:
     def multipliers(self) -> np.ndarray:
         """Floquet multipliers ``(n,)``, largest first; nan where a guard is touched."""
         product = np.eye(self.loop.x.shape[1])
-        for each in self.maps:
-            product = each @ product
+        with np.errstate(all="ignore"):
+            for each in self.maps:
+                product = each @ product
         if not np.all(np.isfinite(product)):
             return np.full(len(product), np.nan, dtype=complex)
         if len(self.maps) > 1 and np.finfo(float).eps * np.linalg.norm(product) > BLURRED:

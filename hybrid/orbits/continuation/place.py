@@ -339,7 +339,9 @@ def slides(orbit: Pass, i: int) -> bool:
     name = next((fired[0] for fired in before if fired), None)
     if name is None:
         return False
-    return family.is_along(name, family.route[i].mode, *moment(orbit, i, 0.5), orbit.loop.values)
+    # Half way through a short contact its guard stands still, too.
+    moments = (moment(orbit, i, share) for share in (0.25, 0.5, 0.75))
+    return all(family.is_along(name, family.route[i].mode, *each, orbit.loop.values) for each in moments)
 
 
 def is_real(orbit: Pass) -> bool:

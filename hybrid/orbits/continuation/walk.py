@@ -21,6 +21,7 @@ from hybrid.orbits.continuation.place import (
 )
 from hybrid.orbits.continuation.route import Route
 from hybrid.orbits.continuation.smooth import TESTS, branch_point, told
+from hybrid.simulation.simulate import simulate
 
 # Lengths of steps along the branch, in units of the sizes of the orbit and of the range of the parameter.
 FIRST_STEP = 0.01
@@ -40,6 +41,8 @@ GROWN = 1.05
 # taken longer.
 CROSSED = 3e-3
 OVER = 1.5
+# How far ahead of a place where no orbit is found the system is asked what it does.
+AHEAD = 1e-4
 # A change of the route this near to the one before, in the range of the parameter, is the same one.
 SAME_CHANGE = 1e-7
 
@@ -63,7 +66,7 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
         if made is None:
             length /= 2.0
             if length < SHORTEST_STEP:
-                yield "lost"
+                yield "chatter" if _chatter_ends(place) else "lost"
                 return
             continue
         if _is_crossed(made[0]) and not _is_crossed(place):
@@ -140,6 +143,22 @@ def _stands_still(trace: list[tuple[float, float, float]], place: Place) -> str:
     if place.family.forced or periods[0] <= GROWN * periods[-1] <= GROWN**2 * periods[0]:
         return "family"
     return "homoclinic" if periods[-1] > periods[0] else "instant"
+
+
+def _chatter_ends(place: Place) -> bool:
+    """Whether jumps accumulate on the orbit, and no more on a run a little farther on."""
+    if not any(stretch.within for stretch in place.family.route):
+        return False
+    loop = place.orbit.loop.plus(AHEAD * place.units * place.tangents[0])
+    arc = simulate(
+        place.family.system,
+        place.orbit.whole(0, loop.x[0]),
+        (float(loop.times[0]), float(loop.times[-1])),
+        mode=place.family.route[0].mode,
+        parameters=place.family.all_parameters(loop.values),
+        solver=place.family.solver,
+    )
+    return "limit" not in {jump.kind for jump in arc.jumps}
 
 
 def _is_crossed(place: Place) -> bool:
