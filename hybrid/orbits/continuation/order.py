@@ -78,10 +78,12 @@ def _meetings(orbit: Pass) -> Iterator[Meeting]:
             landing = orbit.landings[k]
             if landing is None:
                 break
+            # A guard that is touched has slopes without bound, and so has what comes after it.
             with np.errstate(all="ignore"):
                 slopes.append(-landing.gradient[:n] @ product / orbit.speed(k))
+                product = orbit.saltations[k] @ product
             names.append(orbit.family.route[k].fired[0])
-            product, state = orbit.saltations[k] @ product, landing.after
+            state = landing.after
             k = (k + 1) % count
             if lasting[k]:
                 break
