@@ -11,6 +11,7 @@ import numpy as np
 from hybrid.orbits.continuation.family import Family
 from hybrid.orbits.continuation.grazing import kick, square_root_coefficient, what_follows
 from hybrid.orbits.continuation.measures import Key, changed, measure_of
+from hybrid.orbits.continuation.parts import holding
 from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import (
     Place,
@@ -246,9 +247,12 @@ def _onward(near: Place, at: Place, key: Key) -> Onward:
             more = len(jumps[1]) >= len(jumps[0])
             known = Onward(None, jumps, first if more else near.orbit, stretch, True)
             corrected = family.corrected(first.loop, first, first.units(near.sizes))
+            if corrected is not None and near.family.held is not None:
+                orbit = holding(corrected[0], near.family.held, near.sizes)
+                corrected = orbit.family.corrected(orbit.loop, orbit, orbit.units(near.sizes))
             if corrected is None:
                 continue
-            onward = np.eye(len(first.loop.flat))[-len(near.sizes) :]
+            onward = np.eye(len(corrected[0].loop.flat))[-len(near.sizes) :]
             place = place_of(corrected[0], onward, near.sizes)
             found = None if place is None else _away(place, at, farther)
             if found is not None:

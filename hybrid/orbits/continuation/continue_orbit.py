@@ -47,8 +47,9 @@ ENDS = {
 
 MANY = (
     "A multiplier is 1, so there are other orbits beside each: the one that is nearest to the orbit before "
-    "is taken, and no conserved quantity is held."
+    "is taken."
 )
+NOTHING_HELD = "No conserved quantity is held."
 
 
 def continue_orbit(
@@ -122,22 +123,20 @@ def continue_orbit(
     progress = None if progress is None else arguments.flag("progress", progress)
     method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
     with CTRL_C, progress_bar(None, "Branch", progress, "orbit") as bar:
-        found, why, isolated = _branch(orbit, parameter, low, high, method, most, bar)
+        found, why, notes = _branch(orbit, parameter, low, high, method, most, bar)
         if CTRL_C.is_set():
             return attrs.evolve(found, status=interrupted_status("the orbits so far"))
     status = _status(why)
     order = next((found.orbit(i).status for i in (0, -1) if not found.orbit(i).status.ok), None)
     if status.ok and order is not None:
         status = attrs.evolve(order, message=f"{status.message} {order.message}")
-    if not isolated:
-        status = attrs.evolve(status, message=f"{status.message} {MANY}")
-    return attrs.evolve(found, status=status)
+    return attrs.evolve(found, status=attrs.evolve(status, message=" ".join([status.message, *notes])))
 
 
 def _branch(
     orbit: PeriodicOrbit, name: str, low: float, high: float, solver: Solver, most: int, bar: Progress
-) -> tuple[Branch, list[str], bool]:
-    """The branch both ways, why it ends at either end, and whether its first orbit is isolated."""
+) -> tuple[Branch, list[str], list[str]]:
+    """The branch both ways, why it ends at either end, and what is to be noted of its first orbit."""
     begin = place_on(orbit, (name,), np.array([high - low]), solver)
     points = points_of(orbit, begin)
     items: list[Item] = [begin]
@@ -147,7 +146,11 @@ def _branch(
         why.append(_walked(attrs.evolve(begin, tangents=sign * begin.tangents), low, high, most, items, bar))
         if why[-1] in ("closed", "interrupted"):
             break
-    return branch_of(items, points), why, not _is_one_of_many(begin)
+    held = begin.family.held
+    notes = [] if held is None else [f"Held as at the start: {held.told}."]
+    if _is_one_of_many(begin):
+        notes += [MANY, NOTHING_HELD] if held is None else [MANY]
+    return branch_of(items, points), why, notes
 
 
 def _is_one_of_many(place: Place) -> bool:
