@@ -24,6 +24,7 @@ from hybrid.orbits.continuation.place import (
     start_of,
 )
 from hybrid.orbits.continuation.route import Route
+from hybrid.orbits.continuation.seams import is_same_motion
 from hybrid.simulation.simulate import simulate
 
 # The change is enclosed by so many halvings of a step, each time before it is asked what changes.
@@ -112,6 +113,12 @@ class Change:
         return (self.place.family.route, *(() if onward is None else (onward.family.route,)))
 
     @cached_property
+    def alters(self) -> bool:
+        """Whether the motion is another one beyond it: not if a seam within one smooth field is met."""
+        beyond = self.onward.place
+        return beyond is None or not is_same_motion(self.before.orbit, beyond.orbit)
+
+    @cached_property
     def kind(self) -> str:
         """Kind of the bifurcation."""
         onward, route = self.onward, self.place.family.route
@@ -164,7 +171,7 @@ class Change:
             "+".join(_listed(each) for each in jumps) or "no jump" for jumps in self.onward.jumps
         )
         beyond = f"{told}; the orbit {goes} with {after} in place of {before}"
-        stays = self.onward.same_way and bool(np.all(np.abs(self.onward.place.orbit.free_multipliers) < 1.0))
+        stays = self.onward.same_way and self.onward.place.orbit.stable
         if key.kind != "top" or stays or self.coefficient is None:
             return beyond
         follows = what_follows(self.place.orbit.free_multipliers)

@@ -181,7 +181,7 @@ def branch_of(items: list[Item], points: Points) -> Branch:
     passes = [place.orbit for place in places]
     family = passes[0].family
     where = [points.at(each) for each in passes]
-    stable = {id(place): is_stable(place) for place in places}
+    stable = {id(place): place.orbit.stable for place in places}
     branch = Branch(
         system=family.system,
         name=family.names[0],
@@ -262,11 +262,6 @@ def points_of(orbit: PeriodicOrbit, place: Place) -> Points:
     if not place.family.forced:
         points.shares[place.family.route] = share_of(place.orbit, orbit.t0)
     return points
-
-
-def is_stable(place: Place) -> bool:
-    """Whether all multipliers, but for the one along an autonomous orbit, are inside the unit circle."""
-    return bool(np.all(np.abs(place.orbit.free_multipliers) < 1.0))
 
 
 def bifurcation_of(event: Event, stable: tuple[bool | None, bool | None], points: Points) -> Bifurcation:

@@ -278,6 +278,11 @@ class Pass:
         return values[np.argsort(-np.abs(values), kind="stable")]
 
     @property
+    def stable(self) -> bool:
+        """Whether no free multiplier is outside the unit circle, as far as the orbit is closed."""
+        return bool(np.all(np.abs(self.free_multipliers) <= 1.0 + CLOSED))
+
+    @property
     def _turned_maps(self) -> list[np.ndarray]:
         """The scaled tangent maps ``(n, n)`` of the stretches, from where quantities are held."""
         maps = [*self.maps[self._first :], *self.maps[: self._first]]

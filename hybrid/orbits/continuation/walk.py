@@ -87,7 +87,7 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
             beyond = change.onward.place
             met = (change.routes, last.value)
             again = any(routes == met[0] and abs(value - met[1]) < near for routes, value in passed)
-            if not again:
+            if not again and change.alters:
                 yield Event(change.kind, last, change.told, change)
             if beyond is None or again:
                 yield change.kind
