@@ -74,15 +74,23 @@ class Held:
     ) -> Held | None:
         """Those of the quantities that a map keeps to first order; None if it keeps none.
 
-        A quantity of one mode may change in another one, or at a jump. ``before`` and ``after`` are gradients
-        ``(h, n)`` at the two ends, ``tangent (n, n)`` the derivative of the map, ``share`` its accuracy.
+        A quantity of one mode may change in another one, or at a jump. Of quantities whose gradients depend
+        on each other, as those of energy and angular momentum do on a circle, the first ones are kept: their
+        values decide the others. ``before`` and ``after`` are gradients ``(h, n)`` at the two ends, ``tangent
+        (n, n)`` is the derivative of the map, ``share`` its accuracy.
         """
         with np.errstate(invalid="ignore", over="ignore"):
             apart = np.abs(after @ tangent - before) @ magnitude
             terms = (np.abs(after) @ np.abs(tangent) + np.abs(before)) @ magnitude
             same = (apart <= share * terms) & (terms > 0.0) & np.isfinite(self.values)
-        quantities = tuple(each for each, stays in zip(self.quantities, same, strict=True) if stays)
-        return attrs.evolve(self, quantities=quantities, values=self.values[same]) if quantities else None
+        chosen, rows = list[int](), np.zeros((0, len(magnitude)))
+        for i in np.flatnonzero(same).tolist():
+            row = before[i] * magnitude
+            more = np.vstack([rows, row / np.linalg.norm(row)])
+            if np.linalg.svd(more, compute_uv=False)[-1] > share:
+                chosen, rows = [*chosen, i], more
+        quantities = tuple(self.quantities[i] for i in chosen)
+        return attrs.evolve(self, quantities=quantities, values=self.values[chosen]) if chosen else None
 
     def off(self, t: float, x: np.ndarray) -> np.ndarray:
         """Distances ``(h,)`` of a point from the held values."""

@@ -48,6 +48,11 @@ def _root_of_determinant(matrix: np.ndarray) -> float:
     return float(np.linalg.slogdet(matrix)[0] * np.linalg.svd(matrix, compute_uv=False)[-1])
 
 
+def changes(one: float, other: float) -> bool:
+    """Whether a function changes its sign; one that is zero all along, as orbits close, says nothing."""
+    return one * other < 0.0 and min(abs(one), abs(other)) >= CLOSED
+
+
 TESTS: dict[str, Test] = {"fold": fold, "flip": flip, "torus": torus, "branch point": branch_point}
 
 

@@ -19,7 +19,7 @@ from hybrid.orbits.continuation.place import (
     zero_between,
 )
 from hybrid.orbits.continuation.route import Route
-from hybrid.orbits.continuation.smooth import TESTS, branch_point, halves, told
+from hybrid.orbits.continuation.smooth import TESTS, branch_point, changes, halves, told
 
 # Lengths of steps along the branch, in units of the sizes of the orbit and of the range of the parameter.
 FIRST_STEP = 0.01
@@ -29,7 +29,6 @@ FEW_CORRECTIONS = 3
 LONGER = 1.5
 # An orbit that is larger than the first one by this factor, the square root of rounding, grows without bound.
 UNBOUNDED = 2.0**26
-NOTHING = 1e-12
 # Two halves of an orbit are the same if they differ by this share of its size.
 SAME_HALVES = 1e-7
 # Along the last part of a walk, of this length, the parameter stands still if it changes by this share of its
@@ -158,7 +157,7 @@ def _to_the_edge(place: Place, after: Place, low: float, high: float) -> Iterato
 
 def _between(place: Place, after: Place) -> Iterator[Event]:
     """The smooth bifurcations between two places."""
-    changed = [kind for kind, function in TESTS.items() if _changes(function(place), function(after))]
+    changed = [kind for kind, function in TESTS.items() if changes(function(place), function(after))]
     if "branch point" in changed and "fold" in changed:
         # A branch that crosses another one at its turn, as the arms of a pitchfork do.
         changed.remove("fold")
@@ -170,11 +169,6 @@ def _between(place: Place, after: Place) -> Iterator[Event]:
         message = "" if found is None else told(kind, found)
         if found is not None and message:
             yield Event(kind, found, message)
-
-
-def _changes(one: float, other: float) -> bool:
-    """Whether a function changes its sign; one that is zero to rounding all along says nothing."""
-    return one * other < 0.0 and min(abs(one), abs(other)) >= NOTHING
 
 
 def _turned(place: Place, after: Place) -> bool:
