@@ -68,6 +68,11 @@ def continue_orbit(
     derivatives of the run in all of them. A step is the next point if the corrections contract and are small
     beside the step. The section moves along the orbit, so that no jump is near it.
 
+    Quantities that the system declares with ``laws=Laws(conserved=...)`` are held at their values on the
+    first orbit, as far as the jumps keep them, and the status names them. All orbits of the branch have these
+    values, also where orbits of other values are beside each. The branch ends, at a point for example, where
+    no orbit has them any more.
+
     Parameters
     ----------
     orbit
@@ -95,6 +100,10 @@ def continue_orbit(
     ----------
     E. L. Allgower, K. Georg, Introduction to Numerical Continuation Methods, SIAM 2003, chapters 3 and 6.
     Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 4th ed., Springer 2023, chapter 10.
+    F. J. Muñoz-Almaraz, E. Freire, J. Galán, E. Doedel, A. Vanderbauwhede, "Continuation of periodic orbits
+    in conservative and Hamiltonian systems", Physica D 181 (2003) 1, doi:10.1016/S0167-2789(03)00097-6: what
+    conserved quantities do to the equations. Here they take the place of the equations that say nothing, and
+    no unknown is added.
 
     Examples
     --------
@@ -147,7 +156,9 @@ def _branch(
         if why[-1] in ("closed", "interrupted"):
             break
     held = begin.family.held
-    notes = [] if held is None else [f"Held as at the start: {held.told}."]
+    places = [item for item in items if isinstance(item, Place)]
+    told = "" if all(place.family.held is not None for place in places) else ", where the jumps keep it"
+    notes = [] if held is None else [f"Held as at the start{told}: {held.told}."]
     if _is_one_of_many(begin):
         notes += [MANY, NOTHING_HELD] if held is None else [MANY]
     return branch_of(items, points), why, notes
