@@ -10,10 +10,12 @@ import numpy as np
 
 from hybrid.orbits.continuation.family import Family
 from hybrid.orbits.continuation.grazing import kick, square_root_coefficient, what_follows
+from hybrid.orbits.continuation.instants import is_repeated
 from hybrid.orbits.continuation.measures import Key, changed, measure_of
 from hybrid.orbits.continuation.parts import holding
 from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import (
+    BESIDE,
     Place,
     distance,
     interpolated_zero,
@@ -184,7 +186,7 @@ def _listed(names: tuple[str, ...]) -> str:
 
 def located(place: Place, after: Place) -> Change | None:
     """The first change between a real place and one that is not; None if no measure explains it."""
-    near, far, share = place, after, 0.5
+    base, near, far, share = place, place, after, 0.5
     for number in range(MOST_HALVINGS):
         length = distance(near, far)
         if not length > SHORTEST:
@@ -201,8 +203,9 @@ def located(place: Place, after: Place) -> Change | None:
             far = made[0]
         if number % HALVINGS != HALVINGS - 1:
             continue
-        for found, key in _explained(near, far):
-            return _simplest(Change(found, key, near, _onward(near, found, key)))
+        for found, key in _explained(base, near, far):
+            return _simplest(Change(found, key, base, _onward(near, found, key)))
+        base = near
     keys = changed(near.orbit, far.orbit)
     # What jumps has no zero: it is between two places that are the same to rounding.
     return Change(near, keys[0], near, _onward(near, near, keys[0])) if keys else None
@@ -222,18 +225,24 @@ def _simplest(change: Change) -> Change:
         made = back.step(np.array([length]))
         if made is None or is_real(made[0].orbit):
             continue
-        for found, key in _explained(back, made[0]):
+        for found, key in _explained(back, back, made[0]):
             if abs(found.value - change.place.value) < CLOSE * float(onward.sizes[0]):
                 return attrs.evolve(change, exact=Exact(found, key, back))
     return change
 
 
-def _explained(near: Place, far: Place) -> Iterator[tuple[Place, Key]]:
-    """Measures that change their sign between two places, each with the place where it is zero."""
-    for key in changed(near.orbit, far.orbit):
+def _explained(base: Place, near: Place, far: Place) -> Iterator[tuple[Place, Key]]:
+    """Measures that are zero between two places, each with the place where it is.
+
+    The nearer one may have it zero: signs are compared with those at a real place ``base`` before it.
+    """
+    ahead = distance(base, far)
+    for key in changed(base.orbit, far.orbit):
         measure = partial(_measured, measure_of(key))
-        found = interpolated_zero(near, measure, (0.0, distance(near, far)))
-        if found is not None and abs(measure(found)) <= VANISHED * abs(measure(near)):
+        found = interpolated_zero(base, measure, (0.0, ahead))
+        if found is None or abs(measure(found)) > VANISHED * abs(measure(base)):
+            continue
+        if distance(base, found) >= distance(base, near) - BESIDE * ahead:
             yield found, key
 
 
@@ -262,7 +271,8 @@ def _onward(near: Place, at: Place, key: Key) -> Onward:
             onward = np.eye(len(corrected[0].loop.flat))[-len(near.sizes) :]
             place = place_of(corrected[0], onward, near.sizes)
             found = None if place is None else _away(place, at, farther)
-            if found is not None:
+            # A shorter orbit, passed more than once, is one of another branch.
+            if found is not None and not is_repeated(found.orbit) > is_repeated(at.orbit):
                 same_way = bool(np.sign(found.tangents[0, -1]) == slope)
                 return attrs.evolve(known, place=found, same_way=same_way)
             tried.add(family.route)

@@ -6,14 +6,13 @@ import attrs
 import numpy as np
 
 from hybrid.orbits.continuation.passing import Pass
-from hybrid.orbits.continuation.place import Place
+from hybrid.orbits.continuation.place import Place, is_real
 from hybrid.orbits.continuation.route import Loop
 
-# The first orbit is this far from where the branches meet, in units of its size, or nearer by halves.
+# The first orbit is this far from where the branches meet, in units of its size, or nearer by halves. There
+# is one half way, too: it begins there.
 DISTANCE = 0.02
 NEAREST = 1e-6
-# At half the distance the orbit is nearer by at least this factor, as one that begins there.
-SHRINKS = 0.75
 # Distance at which the parameter of a fold is compared with that at the fold.
 APART = 1e-3
 
@@ -33,20 +32,20 @@ def crossing(place: Place, times: int) -> Pass | None:
     direction = one * (other @ along) - other * (one @ along)
     direction /= np.linalg.norm(direction)
 
-    def at(distance: float) -> tuple[Pass, float] | None:
-        guess = orbit.loop.plus(distance * units * direction)
-        found = repeated.family.corrected(guess, orbit, units, direction[None])
-        if found is None:
-            return None
-        return found[0], float(np.linalg.norm((found[0].loop.flat - orbit.loop.flat) / units))
+    def near(change: np.ndarray, reach: float) -> Pass | None:
+        """The real orbit within reach of one that is so far away, in units."""
+        guess = orbit.loop.plus(units * change)
+        found = repeated.family.corrected(guess, orbit, units, direction[None], reach)
+        return None if found is None or not is_real(found[0]) else found[0]
 
-    distance, made = DISTANCE, at(DISTANCE)
+    distance = DISTANCE
     while distance > NEAREST:
+        made = near(distance * direction, np.inf)
+        if made is not None:
+            change = (made.loop.flat - orbit.loop.flat) / units
+            if near(0.5 * change, 0.25 * float(np.abs(change).max())) is not None:
+                return made
         distance /= 2.0
-        nearer = at(distance)
-        if made is not None and nearer is not None and nearer[1] <= SHRINKS * made[1]:
-            return made[0]
-        made = nearer
     return None
 
 

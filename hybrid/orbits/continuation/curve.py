@@ -8,8 +8,9 @@ from functools import partial
 import attrs
 import numpy as np
 
+from hybrid.orbits.continuation.instants import passes_by
 from hybrid.orbits.continuation.passing import Pass
-from hybrid.orbits.continuation.place import Place, is_real, passes_by, zero_on_the_way
+from hybrid.orbits.continuation.place import Place, is_real, zero_on_the_way
 from hybrid.orbits.continuation.smooth import changes, flip, singular, torus
 
 Test = Callable[[Place], float]
@@ -180,7 +181,7 @@ def along_curve(
             return
         yield from _between(curve, spot, after)
         yield after
-        if number > 1 and passes_by(start.place, spot.place, after.place):
+        if number > 1 and passes_by(start.place, spot.place, after.place) is not None:
             yield "closed"
             return
         if np.any(after.place.orbit.scale > UNBOUNDED * start.place.orbit.scale):

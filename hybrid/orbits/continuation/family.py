@@ -21,7 +21,7 @@ from hybrid.solvers import Solver
 from hybrid.system.functions import field_function, guard_function, reset_function
 from hybrid.system.graph import HybridSystem
 from hybrid.transform.extended import extended
-from hybrid.transform.restricted import restricted
+from hybrid.transform.restricted import BEYOND, ends_of, restricted
 
 # A stretch that takes no more than these units in the last place of the time is a straight line.
 ULPS = 64
@@ -217,15 +217,27 @@ class Family:
             moved = x + (end - begin) * first_rate
             return Flow(None, moved, np.eye(n, n + len(values)), first_rate, last_rate, stretch.counters)
         forwards = end > begin
-        system = restricted(self.extended, stretch.mode, stretch.within, backwards=not forwards)
-        arc = self._run(system, stretch.mode, state, (begin, end) if forwards else (-begin, -end), most)
-        if not arc.status.ok or str(arc.mode[-1]) != stretch.end_mode:
+        # Where the field has roots of a guard it is smooth on either side of that alone.
+        sided = not stretch.within and self.compiled.emitted.propagators[mode].root > 1
+        system = restricted(self.extended, stretch.mode, stretch.within, not forwards, sided)
+        start = stretch.mode
+        if sided and self._is_beyond(start, begin, state):
+            start = BEYOND + start
+        arc = self._run(system, start, state, (begin, end) if forwards else (-begin, -end), most)
+        if not arc.status.ok or str(arc.mode[-1]).removeprefix(BEYOND) != stretch.end_mode:
             raise ArithmeticError
         assert arc.fundamental is not None
         found = arc.x[-1, :n], arc.fundamental[:n], first_rate, self._rate(last_mode, end, arc.x[-1])
         if not all(np.all(np.isfinite(each)) for each in found):
             raise ArithmeticError
         return Flow(arc, *found, tuple(arc.x[-1, n + len(values) :].tolist()))
+
+    def _is_beyond(self, mode: str, t: float, state: np.ndarray) -> bool:
+        """Whether a state is beyond a guard at which its mode ends."""
+        return any(
+            float(each.guard.direction) * self._guard(each.name, t, state)[0] > 0.0
+            for each in ends_of(self.extended, mode)
+        )
 
     def landing(self, stretch: Stretch, flow: Flow, t: float, values: np.ndarray) -> Landing | None:
         """The jumps at the end of a stretch."""

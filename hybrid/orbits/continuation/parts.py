@@ -62,10 +62,10 @@ def holding(orbit: Pass, held: Held, sizes: np.ndarray) -> Pass:
     formula = formulas[i]
     if formula is None:
         return orbit
-    # Stretches that are the same stay the same, so that the halves of an orbit can be compared.
-    numbers = [2 if each == route[i] and orbit.landings[i - 1] is not None else 1 for each in route]
-    family, loop = _in_parts(orbit, numbers)
-    formula = attrs.evolve(formula, stretch=sum(numbers[: i + 1]) - 1)
+    numbers = np.ones(len(route), dtype=int)
+    numbers[i] += orbit.landings[i - 1] is not None
+    family, loop = _in_parts(orbit, numbers.tolist())
+    formula = attrs.evolve(formula, stretch=i + int(numbers[i]) - 1)
     found = attrs.evolve(family, held=formula).around(loop)
     if found is None or found.departure is None:
         return orbit

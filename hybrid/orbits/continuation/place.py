@@ -19,7 +19,6 @@ from hybrid.orbits.held import conserved_at
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver
-from hybrid.system.periodicity import whole_turns
 from hybrid.transform.aged import aged, with_age
 
 # A step may turn by this angle (its cosine).
@@ -109,35 +108,17 @@ class Place:
         return found, made[1]
 
 
+def at_value(place: Place, value: float) -> Place | None:
+    """The place at a value of the first parameter, beside one that has it but for rounding."""
+    loop, held = place.orbit.loop, np.eye(len(place.units))[-len(place.sizes) :][:1]
+    there = attrs.evolve(loop, values=np.append(value, loop.values[1:]))
+    made = place.family.corrected(there, place.orbit, place.units, held)
+    return None if made is None else place_of(made[0], place.tangents, place.sizes)
+
+
 def distance(place: Place, other: Place) -> float:
     """How far another place of the same route is along the first tangent."""
     return float(place.tangents[0] @ ((other.orbit.loop.flat - place.orbit.loop.flat) / place.units))
-
-
-def passes_by(start: Place, before: Place, after: Place) -> bool:
-    """Whether a step passes the start of a walk, whole turns of angles and whole forcing periods aside."""
-    if after.family.route != start.family.route or before.family.route != start.family.route:
-        return False
-    units, first = start.units, start.orbit.loop.flat
-    again = first + _same_again(start, after)
-    one, other = ((each.orbit.loop.flat - again) / units for each in (before, after))
-    chord = other - one
-    length = float(np.linalg.norm(chord))
-    share = -one @ chord / length**2 if length > 0.0 else -1.0
-    return bool(0.0 <= share <= 1.0 and np.linalg.norm(one + share * chord) < 0.1 * length)
-
-
-def _same_again(start: Place, after: Place) -> np.ndarray:
-    """Whole turns, and whole forcing periods or any time without forcing, from one place to another."""
-    first, last, family = start.orbit.loop, after.orbit.loop, start.family
-    turns = family.system.turn_lengths[: family.n]
-    moved, late = np.mean(last.x - first.x, axis=0), float(np.mean(last.times - first.times))
-    around = turns * whole_turns(moved, turns)
-    if family.forced:
-        forcing = family.period(first.values) / family.periods
-        late = round(late / forcing) * forcing
-    times = np.full(len(first.times), late)
-    return np.concatenate([np.tile(around, len(first.x)), times, np.zeros(len(first.values))])
 
 
 def zero_between(place: Place, after: Place, function: Callable[[Place], float]) -> Place | None:

@@ -119,14 +119,20 @@ def mode_at(orbit: Pass, i: int, share: float) -> str:
 
 
 def fundamental_at(orbit: Pass, i: int, share: float) -> np.ndarray:
-    """The saltated fundamental matrix ``(n, n)`` over the period from a point within a stretch."""
+    """The saltated fundamental matrix ``(n, n)`` over the period from a point within a stretch.
+
+    It is nan if the stretch cannot be run in two parts, as beside a touch.
+    """
     family, loop = orbit.family, orbit.loop
     (t, x), mode = moment(orbit, i, share), mode_at(orbit, i, share)
     n, stretch, (begin, end) = family.n, family.route[i], loop.times[i : i + 2]
     before = attrs.evolve(stretch, end_mode=mode)
     after = attrs.evolve(stretch, mode=mode, within=stretch.within if mode == stretch.mode else ())
-    first = family.flow(before, loop.x[i], float(begin), t, loop.values).slopes[:, :n]
-    last = family.flow(after, x[:n], t, float(end), loop.values).slopes[:, :n]
+    try:
+        first = family.flow(before, loop.x[i], float(begin), t, loop.values).slopes[:, :n]
+        last = family.flow(after, x[:n], t, float(end), loop.values).slopes[:, :n]
+    except ArithmeticError:
+        return np.full((n, n), np.nan)
     matrix = orbit.saltations[i] @ last
     for each in [*orbit.maps[i + 1 :], *orbit.maps[:i]]:
         matrix = each @ matrix

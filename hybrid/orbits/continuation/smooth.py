@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hybrid.orbits.continuation.passing import CLOSED, Pass
+from hybrid.orbits.continuation.passing import CLOSED
 from hybrid.orbits.continuation.place import Place
 
 Test = Callable[[Place], float]
@@ -81,12 +81,3 @@ def _pair(place: Place) -> complex:
     """The multiplier above the real axis that is nearest to the unit circle; 0 if there is none."""
     above = [complex(each) for each in place.orbit.free_multipliers if each.imag > 0.0]
     return min(above, key=lambda each: abs(abs(each) - 1.0), default=0j)
-
-
-def halves(orbit: Pass) -> np.ndarray | None:
-    """How far the second half of an orbit is from the first ``(S n / 2,)``; None for a route of one half."""
-    route, x = orbit.family.route, orbit.loop.x
-    half = len(route) // 2
-    if len(route) % 2 or route[:half] != route[half:]:
-        return None
-    return np.asarray((x[half:] - x[:half]).ravel() / np.tile(orbit.scale, half))

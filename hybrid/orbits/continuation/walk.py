@@ -8,18 +8,19 @@ import attrs
 import numpy as np
 
 from hybrid.orbits.continuation.change import Change, located
+from hybrid.orbits.continuation.instants import SAME, halves, passes_by
 from hybrid.orbits.continuation.place import (
     SHORTEST_STEP,
     Place,
+    at_value,
     distance,
     interpolated_zero,
     is_real,
-    passes_by,
     refined,
     zero_between,
 )
 from hybrid.orbits.continuation.route import Route
-from hybrid.orbits.continuation.smooth import TESTS, branch_point, changes, halves, told
+from hybrid.orbits.continuation.smooth import TESTS, branch_point, changes, told
 
 # Lengths of steps along the branch, in units of the sizes of the orbit and of the range of the parameter.
 FIRST_STEP = 0.01
@@ -29,11 +30,9 @@ FEW_CORRECTIONS = 3
 LONGER = 1.5
 # An orbit that is larger than the first one by this factor, the square root of rounding, grows without bound.
 UNBOUNDED = 2.0**26
-# Two halves of an orbit are the same if they differ by this share of its size.
-SAME_HALVES = 1e-7
 # Along the last part of a walk, of this length, the parameter stands still if it changes by this share of its
 # range. The period grows without bound, or becomes zero, if it changes by this factor there.
-LAST_PART = 0.5
+LAST_PART = 0.1
 STILL = 1e-8
 GROWN = 1.05
 # Another branch crosses near a place where the equations are this near to singular; a step that ends there is
@@ -70,16 +69,25 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
             # So near to another branch that it may be on that one: the step goes over the place.
             made = place.step(np.array([OVER * length])) or made
         after, corrections = made
-        if not is_real(after.orbit):
-            change = located(place, after)
-            if change is None:
-                yield "lost"
-                return
-            last = change.place
-            if not low <= last.value <= high:
-                yield from _to_the_edge(place, last, low, high)
-                yield "range"
-                return
+        change = None if is_real(after.orbit) else located(place, after)
+        if change is None and not is_real(after.orbit):
+            yield "lost"
+            return
+        last = after if change is None else change.place
+        if _turned(place, last):
+            yield "equilibrium"
+            return
+        if _comes_to_its_half(place, last):
+            half = _halved(place, last)
+            if half is not None and low <= half.value <= high:
+                yield Event("flip", half, "the orbit has half the period: this branch begins here")
+            yield "flip"
+            return
+        if not low <= last.value <= high:
+            yield from _to_the_edge(place, last, low, high)
+            yield "range"
+            return
+        if change is not None:
             near = SAME_CHANGE * float(place.sizes[0])
             # Where a guard has no speed the parameter may stand still: that is no fold.
             yield from (each for each in _between(place, last) if abs(each.place.value - last.value) > near)
@@ -95,26 +103,17 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
             place, length = beyond, min(length, FIRST_STEP)
             yield place
             continue
-        if not low <= after.value <= high:
-            yield from _to_the_edge(place, after, low, high)
-            yield "range"
-            return
-        if _turned(place, after):
-            yield "equilibrium"
-            return
-        if _comes_to_its_half(place, after):
-            half = _halved(place, after)
-            if half is not None and low <= half.value <= high:
-                yield Event("flip", half, "the orbit has half the period: this branch begins here")
-            yield "flip"
+        share = None if place is start else passes_by(start, place, after)
+        closing = None if share is None else place.step(np.array([share * length]))
+        if closing is not None:
+            yield from _between(place, closing[0])
+            yield start
+            yield "closed"
             return
         yield from _between(place, after)
         yield after
         if np.any(after.orbit.scale > UNBOUNDED * start.orbit.scale):
             yield "infinity"
-            return
-        if place is not start and passes_by(start, place, after):
-            yield "closed"
             return
         trace.append((distance(place, after), after.value, after.orbit.loop.period))
         why = _stands_still(trace, after)
@@ -151,6 +150,7 @@ def _to_the_edge(place: Place, after: Place, low: float, high: float) -> Iterato
     edge = low if after.value < low else high
     last = zero_between(place, after, lambda each: each.value - edge)
     if last is not None:
+        last = at_value(last, edge) or last
         yield from _between(place, last)
         yield last
 
@@ -182,9 +182,9 @@ def _turned(place: Place, after: Place) -> bool:
 def _comes_to_its_half(place: Place, after: Place) -> bool:
     """Whether an orbit becomes one of half the period, or a step ends on the branch of these."""
     here, there = halves(place.orbit), halves(after.orbit)
-    if here is None or there is None or np.linalg.norm(here) <= SAME_HALVES:
+    if here is None or there is None or np.linalg.norm(here) <= SAME:
         return False
-    return bool(here @ there < 0.0 or np.linalg.norm(there) <= SAME_HALVES)
+    return bool(here @ there < 0.0 or np.linalg.norm(there) <= SAME)
 
 
 def _halved(place: Place, after: Place) -> Place | None:

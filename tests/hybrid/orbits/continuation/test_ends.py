@@ -1,8 +1,12 @@
 """A branch is one curve: each step is the next point of it, and each end has a name."""
 
+import collections
+
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
+import models
 from hybrid import (
     Every,
     Guard,
@@ -11,9 +15,11 @@ from hybrid import (
     Reset,
     Transition,
     continue_orbit,
+    filippov,
     from_equations,
     periodic_orbit,
     simulate,
+    switch_branch,
 )
 from tests.hybrid.orbits.traffic import traffic_light
 
@@ -170,3 +176,78 @@ def test_what_is_listed_lies_in_the_span_on_an_orbit_that_closes():
     for each in branch.bifurcations:
         assert 0.97 <= each.value <= 1.03
         assert each.orbit.residual < 1e-6
+
+
+@pytest.mark.parametrize("span", [(0.04, 0.3), (0.06, 0.1)])
+def test_a_branch_ends_at_a_homoclinic_orbit(span):
+    """The rimless wheel has multipliers 1 and ``cos(2 alpha)^2`` down to where it stops upright."""
+    branch = continue_orbit(periodic_orbit(models.rimless_wheel(), (0.0, 0.6), period=1.0), "gamma", span)
+    a = np.pi / 8
+
+    def spare(gamma):
+        return np.sin(a) * np.sin(gamma) * 4 / np.tan(2 * a) ** 2 - 2 * (1 - np.cos(gamma - a))
+
+    end = brentq(spare, 0.01, 0.3)
+    assert "period grows without bound" in branch.status.message
+    np.testing.assert_allclose(branch.parameter[[0, -1]], [end, span[1]], rtol=1e-7)
+    np.testing.assert_allclose(np.abs(branch.multipliers), [[1.0, 0.5]] * len(branch), rtol=1e-3)
+    assert branch.bifurcations == ()
+
+
+def test_a_closed_branch_is_walked_once():
+    """It comes back to its first orbit with another jump first: once at the first point, and once more."""
+    stop, p = models.stop_oscillator(), {"F0": 0.5, "A": 2.0}
+    run = simulate(stop, (0.1, 0.5), (0.0, 600 * np.pi), parameters=p)
+    orbit = periodic_orbit(stop, run.x[-1], mode=str(run.mode[-1]), parameters=p)
+    branch = continue_orbit(orbit, "w", (0.5, 2.5))
+    assert "it is closed" in branch.status.message
+    np.testing.assert_allclose(branch.x0[0], branch.x0[-1], atol=1e-8)
+    # The orbit loses its symmetry at two branch points; each bifurcation between has a mirror image.
+    kinds = collections.Counter(each.kind for each in branch.bifurcations)
+    assert kinds == {"grazing": 4, "fold": 2, "flip": 2, "branch point": 2}
+
+
+@pytest.mark.parametrize("low", [0.4, 0.5, 0.6])
+def test_a_change_at_a_place_of_the_walk_itself(low):
+    """The circle touches the surface ``x = c`` at ``c = 1``, where halvings of a step from 1.2 may end."""
+    system = filippov(
+        state=("x", "y"),
+        parameters={"c": 1.2},
+        below=lambda t, x, p: (
+            x.x * (1 - x.x**2 - x.y**2) - x.y,
+            x.y * (1 - x.x**2 - x.y**2) + x.x,
+        ),
+        above=lambda t, x, p: (-1.0, 0.0),
+        switching=lambda t, x, p: x.x - p.c,
+    )
+    orbit = periodic_orbit(system, (0.0, 1.0), mode="below", period=6.28)
+    branch = continue_orbit(orbit, "c", (low, 1.5))
+    assert branch.status.ok
+    assert branch.parameter[[0, -1]].tolist() == [low, 1.5]
+    (change,) = branch.bifurcations
+    assert change.kind == "grazing-sliding"
+    assert change.value == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_doubled_orbit_begins_at_its_flip():
+    """A ball on a table: an orbit of eleven impacts doubles within 1e-4 of its size, beside others."""
+    table, g, e, w = models.bouncing_table(), 9.81, 0.5, 36.0
+    size = 0.5 * (np.pi * (1 - e) / (1 + e) + np.hypot(np.pi / 3, 2 * (1 + e**2) / (1 + e) ** 2))
+    amplitude, phase = size * g / w**2, np.arccos(np.pi * (1 - e) / (1 + e) / size)
+    v = np.pi * g / w - amplitude * w * np.cos(phase)
+    orbit = periodic_orbit(
+        table, (0.0, v), mode="flight", t0=phase / w, periods=1, parameters={"A": amplitude}
+    )
+    bifurcations = continue_orbit(orbit, "A", (0.002, 0.02)).bifurcations
+    flip, grazing, *_ = bifurcations
+    assert (flip.kind, grazing.kind) == ("flip", "grazing")
+    doubled = switch_branch(flip)
+    branch = continue_orbit(doubled, "A", (0.002, 0.02))
+    first = branch.bifurcations[0]
+    assert "this branch begins here" in first.message
+    assert first.value == pytest.approx(flip.value, rel=1e-10)
+    # It ends at the grazing of the single orbit, where only one of its halves still has the last impact.
+    last = branch.bifurcations[-1]
+    assert last.kind == "grazing"
+    assert "no orbit is found beyond" in last.message
+    assert last.value == pytest.approx(grazing.value, rel=1e-9)
