@@ -131,6 +131,9 @@ class PeriodicOrbit:
     def sensitivity(self, names: Iterable[str], *, solver: Solver | None = None) -> OrbitSensitivity:
         """Derivatives in parameters: of the point, ``.x0 (n, m)``, ``.period (m,)``, ``.multipliers (n, m)``.
 
+        They are those at fixed values of the quantities that the system declares with
+        ``laws=Laws(conserved=...)``: such orbits come in families, one orbit per value.
+
         Parameters
         ----------
         names
@@ -142,7 +145,7 @@ class PeriodicOrbit:
         ------
         ArgumentError
             If the orbit has not converged, a parameter does not exist, or the orbit is not isolated: a
-            multiplier is 1, besides the one along an autonomous orbit.
+            multiplier is 1, besides the one along an autonomous orbit and one per conserved quantity.
         """
         if not self.closes:
             raise ArgumentError(f"The orbit has not converged: {self.status.message}")

@@ -150,7 +150,7 @@ class Shooting:
         shot = self.shoot(point)
         share = float(np.sqrt(self.solver.rtol))
         values = self.system.parameter_values(self.parameters)
-        held = held_by(self.system, values, shot, share, self.counters)
+        held = held_by(self.system, values, shot, share, self.whole(shot.point))
         if held is not None and free_period:
             return attrs.evolve(self, held=held)._search(shot, True, tolerance, max_iterations)
         found = self._search(shot, free_period, tolerance, max_iterations)
@@ -423,7 +423,7 @@ class Shooting:
 
     def _explained(self, status: Status, shot: Shot, newton: Newton, multipliers: np.ndarray) -> Status:
         """The status of an orbit, with what is held, and whether the orbit is still one of many."""
-        told = [] if self.held is None else [self.held.told]
+        told = [] if self.held is None else [f"Held as at the guess: {self.held.told}."]
         if self._is_one_of_many(shot, newton, multipliers):
             besides = " besides that of the flow" if newton.free_period else ""
             told.append(f"{FAMILY}: a multiplier is 1{besides}, and the guess decides which one is found.")

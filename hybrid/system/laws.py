@@ -137,7 +137,7 @@ class Laws(Portable):
     conserved
         Quantities that never change, such as an energy. They find a force with a wrong sign or factor, a
         component that a reset forgets, a loss where none is meant. `hybrid.periodic_orbit` holds them at
-        their values at the guess.
+        their values at the guess, `hybrid.continue_orbit` at those of the first orbit.
     dissipated
         Quantities that never grow; or pairs ``(quantity, power)``: it grows by no more than the integral of
         the power put in. They find friction that drives, a restitution above one, an impulse of the wrong

@@ -91,7 +91,8 @@ class Branch:
     multipliers
         Floquet multipliers, ``(N, n)``, largest first.
     stable
-        Whether all multipliers, without that along an autonomous orbit, are inside the unit circle, ``(N,)``.
+        Whether no multiplier is outside the unit circle, ``(N,)``, without those that are 1 on every orbit:
+        of an autonomous system the one along the orbit, and one for each conserved quantity that is held.
     bifurcations
         Each :class:`Bifurcation`, in order along the branch.
     status

@@ -12,6 +12,7 @@ from hybrid.orbits.continuation.family import Family
 from hybrid.orbits.continuation.grazing import kick, square_root_coefficient, what_follows
 from hybrid.orbits.continuation.instants import is_repeated
 from hybrid.orbits.continuation.measures import Key, changed, measure_of
+from hybrid.orbits.continuation.parts import holding
 from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import (
     BESIDE,
@@ -25,6 +26,7 @@ from hybrid.orbits.continuation.place import (
     start_of,
 )
 from hybrid.orbits.continuation.route import Route
+from hybrid.orbits.continuation.seams import is_same_motion
 from hybrid.simulation.simulate import simulate
 
 # The change is enclosed by so many halvings of a step, each time before it is asked what changes.
@@ -113,6 +115,12 @@ class Change:
         return (self.place.family.route, *(() if onward is None else (onward.family.route,)))
 
     @cached_property
+    def alters(self) -> bool:
+        """Whether the motion is another one beyond it: not if a seam within one smooth field is met."""
+        beyond = self.onward.place
+        return beyond is None or not is_same_motion(self.before.orbit, beyond.orbit)
+
+    @cached_property
     def kind(self) -> str:
         """Kind of the bifurcation."""
         onward, route = self.onward, self.place.family.route
@@ -165,7 +173,7 @@ class Change:
             "+".join(_listed(each) for each in jumps) or "no jump" for jumps in self.onward.jumps
         )
         beyond = f"{told}; the orbit {goes} with {after} in place of {before}"
-        stays = self.onward.same_way and bool(np.all(np.abs(self.onward.place.orbit.free_multipliers) < 1.0))
+        stays = self.onward.same_way and self.onward.place.orbit.stable
         if key.kind != "top" or stays or self.coefficient is None:
             return beyond
         follows = what_follows(self.place.orbit.free_multipliers)
@@ -256,9 +264,12 @@ def _onward(near: Place, at: Place, key: Key) -> Onward:
             more = len(jumps[1]) >= len(jumps[0])
             known = Onward(None, jumps, first if more else near.orbit, stretch, True)
             corrected = family.corrected(first.loop, first, first.units(near.sizes))
+            if corrected is not None and near.family.held is not None:
+                orbit = holding(corrected[0], near.family.held, near.sizes)
+                corrected = orbit.family.corrected(orbit.loop, orbit, orbit.units(near.sizes))
             if corrected is None:
                 continue
-            onward = np.eye(len(first.loop.flat))[-len(near.sizes) :]
+            onward = np.eye(len(corrected[0].loop.flat))[-len(near.sizes) :]
             place = place_of(corrected[0], onward, near.sizes)
             found = None if place is None else _away(place, at, farther)
             # A shorter orbit, passed more than once, is one of another branch.

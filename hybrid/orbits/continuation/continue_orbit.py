@@ -49,8 +49,9 @@ ENDS = {
 
 MANY = (
     "A multiplier is 1, so there are other orbits beside each: the one that is nearest to the orbit before "
-    "is taken, and no conserved quantity is held."
+    "is taken."
 )
+NOTHING_HELD = "No conserved quantity is held."
 
 
 def continue_orbit(
@@ -68,6 +69,11 @@ def continue_orbit(
     corrected by the shortest Newton step of the state, the period and the parameter together, with the
     derivatives of the run in all of them. A step is the next point if the corrections contract and are small
     beside the step. The section moves along the orbit, so that no jump is near it.
+
+    Quantities that the system declares with ``laws=Laws(conserved=...)`` are held at their values on the
+    first orbit, as far as the jumps keep them, and the status names them. All orbits of the branch have these
+    values, also where orbits of other values are beside each. The branch ends, at a point for example, where
+    no orbit has them any more.
 
     Parameters
     ----------
@@ -96,6 +102,10 @@ def continue_orbit(
     ----------
     E. L. Allgower, K. Georg, Introduction to Numerical Continuation Methods, SIAM 2003, chapters 3 and 6.
     Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 4th ed., Springer 2023, chapter 10.
+    F. J. Muñoz-Almaraz, E. Freire, J. Galán, E. Doedel, A. Vanderbauwhede, "Continuation of periodic orbits
+    in conservative and Hamiltonian systems", Physica D 181 (2003) 1, doi:10.1016/S0167-2789(03)00097-6: what
+    conserved quantities do to the equations. Here they take the place of the equations that say nothing, and
+    no unknown is added.
 
     Examples
     --------
@@ -124,22 +134,20 @@ def continue_orbit(
     progress = None if progress is None else arguments.flag("progress", progress)
     method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
     with CTRL_C, progress_bar(None, "Branch", progress, "orbit") as bar:
-        found, why, isolated, advice = _branch(orbit, parameter, low, high, method, most, bar)
+        found, why, notes, advice = _branch(orbit, parameter, low, high, method, most, bar)
         if CTRL_C.is_set():
             return attrs.evolve(found, status=interrupted_status("the orbits so far"))
     status = _status(why, advice)
     order = next((found.orbit(i).status for i in (0, -1) if not found.orbit(i).status.ok), None)
     if status.ok and order is not None:
         status = attrs.evolve(order, message=f"{status.message} {order.message}")
-    if not isolated:
-        status = attrs.evolve(status, message=f"{status.message} {MANY}")
-    return attrs.evolve(found, status=status)
+    return attrs.evolve(found, status=attrs.evolve(status, message=" ".join([status.message, *notes])))
 
 
 def _branch(
     orbit: PeriodicOrbit, name: str, low: float, high: float, solver: Solver, most: int, bar: Progress
-) -> tuple[Branch, list[str], bool, str]:
-    """The branch both ways, why it ends, whether its first orbit is isolated, and advice if it is lost."""
+) -> tuple[Branch, list[str], list[str], str]:
+    """The branch both ways, why it ends, what is to be noted of its first orbit, and advice if it is lost."""
     begin = place_on(orbit, (name,), np.array([high - low]), solver)
     points = points_of(orbit, begin)
     items: list[Item] = [begin]
@@ -152,7 +160,13 @@ def _branch(
             advice = _advice(next(item for item in reversed(items) if isinstance(item, Place)))
         if why[-1] in ("closed", "interrupted"):
             break
-    return branch_of(items, points), why, not _is_one_of_many(begin), advice
+    held = begin.family.held
+    places = [item for item in items if isinstance(item, Place)]
+    told = "" if all(place.family.held is not None for place in places) else ", where the jumps keep it"
+    notes = [] if held is None else [f"Held as at the start{told}: {held.told}."]
+    if _is_one_of_many(begin):
+        notes += [MANY, NOTHING_HELD] if held is None else [MANY]
+    return branch_of(items, points), why, notes, advice
 
 
 def _advice(place: Place) -> str:
@@ -195,7 +209,7 @@ def branch_of(items: list[Item], points: Points) -> Branch:
     passes = [place.orbit for place in places]
     family = passes[0].family
     where = [points.at(each) for each in passes]
-    stable = {id(place): is_stable(place) for place in places}
+    stable = {id(place): place.orbit.stable for place in places}
     branch = Branch(
         system=family.system,
         name=family.names[0],
@@ -276,11 +290,6 @@ def points_of(orbit: PeriodicOrbit, place: Place) -> Points:
     if not place.family.forced:
         points.shares[place.family.route] = share_of(place.orbit, orbit.t0)
     return points
-
-
-def is_stable(place: Place) -> bool:
-    """Whether all multipliers, but for the one along an autonomous orbit, are inside the unit circle."""
-    return bool(np.all(np.abs(place.orbit.free_multipliers) < 1.0))
 
 
 def bifurcation_of(event: Event, stable: tuple[bool | None, bool | None], points: Points) -> Bifurcation:

@@ -111,7 +111,6 @@ def is_supercritical(place: Place, coefficient: float) -> bool:
         made = place.step(np.array([sign * APART]))
         if made is None:
             return False
-        stable = bool(np.all(np.abs(made[0].orbit.free_multipliers) < 1.0))
-        if stable == ((made[0].value - place.value) * coefficient > 0.0):
+        if made[0].orbit.stable == ((made[0].value - place.value) * coefficient > 0.0):
             return False
     return True

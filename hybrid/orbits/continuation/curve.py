@@ -11,7 +11,7 @@ import numpy as np
 from hybrid.orbits.continuation.instants import passes_by
 from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import Place, is_real, zero_on_the_way
-from hybrid.orbits.continuation.smooth import flip, singular, torus
+from hybrid.orbits.continuation.smooth import changes, flip, singular, torus
 
 Test = Callable[[Place], float]
 
@@ -238,7 +238,7 @@ def _between(curve: Curve, spot: Spot, after: Spot) -> Iterator[Special]:
     if not curve.has_multipliers:
         return
     for kind, function, message in _tests(curve.kind, spot):
-        if not function(spot) * function(after) < 0.0:
+        if not changes(function(spot), function(after)):
             continue
         found = _zero(curve, spot, after, function)
         if found is None:
@@ -267,9 +267,12 @@ def _tests(kind: str, spot: Spot) -> Iterator[tuple[str, Callable[[Spot], float]
 
 
 def _others(sign: float, spot: Spot) -> float:
-    """The product of ``mu + sign`` over the multipliers but for the one that is nearest to ``-sign``."""
-    values = spot.place.orbit.free_multipliers + sign
-    return float(np.prod(np.delete(values, int(np.argmin(np.abs(values))))).real)
+    """The product of ``-sign - mu`` over the multipliers but for the one that is ``-sign``.
+
+    It is the slope of the characteristic polynomial there, which rounding does not split as it does roots.
+    """
+    polynomial = np.poly(spot.place.orbit.free_multipliers)
+    return float(np.polyval(np.polyder(polynomial), -sign).real)
 
 
 def _from_resonance(turn: float, spot: Spot) -> float:

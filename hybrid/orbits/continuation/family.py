@@ -14,6 +14,7 @@ from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.passing import CLOSED, Flow, Landing, Pass
 from hybrid.orbits.continuation.route import Loop, Route, Stretch
+from hybrid.orbits.held import Held
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver
@@ -45,7 +46,7 @@ class Family:
 
     ``periods`` is the number of forcing periods, 0 for an autonomous system. ``least`` are sizes ``(n,)`` of
     the states, below which none is measured: an orbit may pass zero. ``counted`` is by how much each counter
-    grows over the period.
+    grows over the period. ``held`` are the conserved quantities that all orbits of the family have in common.
 
     The unknowns are states ``(n,)`` without counters, which the route has. A whole state has them behind.
     """
@@ -58,6 +59,7 @@ class Family:
     route: Route
     least: np.ndarray | float = 0.0
     counted: np.ndarray | float = 0.0
+    held: Held | None = None
 
     @property
     def n(self) -> int:

@@ -251,25 +251,88 @@ class Pass:
     @cached_property
     def multipliers(self) -> np.ndarray:
         """Floquet multipliers ``(n,)``, largest first; nan where a guard is touched."""
-        product = np.eye(self.loop.x.shape[1])
+        free = self.free_multipliers
+        values = np.append(free, np.ones(self.loop.x.shape[1] - len(free)))
+        return values[np.argsort(-np.abs(values), kind="stable")]
+
+    @cached_property
+    def free_multipliers(self) -> np.ndarray:
+        """The multipliers ``(n - r,)`` but those that are 1 on every orbit of the family, largest first.
+
+        The field of an autonomous system is a right eigenvector of the tangent map over the period, and the
+        gradient of a held quantity a left one. What is left is the map of the states of one value of each
+        quantity, across the field.
+        """
+        basis, maps = self._free_directions, self._turned_maps
+        product = basis
         with np.errstate(all="ignore"):
-            for each in self.maps:
+            for each in maps:
                 product = each @ product
         if not np.all(np.isfinite(product)):
-            return np.full(len(product), np.nan, dtype=complex)
-        if len(self.maps) > 1 and np.finfo(float).eps * np.linalg.norm(product) > BLURRED:
-            values = product_eigenvalues(self.maps, set()).values
+            return np.full(basis.shape[1], np.nan, dtype=complex)
+        if len(maps) > 1 and np.finfo(float).eps * np.linalg.norm(product) > BLURRED:
+            factors, vectors = list[np.ndarray](), basis
+            for each in maps[:-1]:
+                vectors, factor = np.linalg.qr(each @ vectors)
+                factors.append(factor)
+            values = product_eigenvalues([*factors, basis.T @ maps[-1] @ vectors], set()).values
         else:
-            values = np.linalg.eigvals(product)
+            values = np.linalg.eigvals(basis.T @ product)
         return values[np.argsort(-np.abs(values), kind="stable")]
 
     @property
-    def free_multipliers(self) -> np.ndarray:
-        """Multipliers without the one along an autonomous orbit."""
-        values = self.multipliers
-        if self.family.forced:
-            return values
-        return np.delete(values, int(np.argmin(np.abs(values - 1.0))))
+    def stable(self) -> bool:
+        """Whether no free multiplier is outside the unit circle, as far as the orbit is closed."""
+        return bool(np.all(np.abs(self.free_multipliers) <= 1.0 + CLOSED))
+
+    @property
+    def _turned_maps(self) -> list[np.ndarray]:
+        """The scaled tangent maps ``(n, n)`` of the stretches, from where quantities are held."""
+        maps = [*self.maps[self._first :], *self.maps[: self._first]]
+        return [each / self.scale[:, None] * self.scale for each in maps]
+
+    @property
+    def monodromy(self) -> np.ndarray:
+        """The tangent map ``(n, n)`` over the period from the point where quantities are held."""
+        product = np.eye(len(self.scale))
+        for each in self._turned_maps:
+            product = each @ product
+        return product * self.scale[:, None] / self.scale
+
+    @property
+    def _first(self) -> int:
+        """The stretch at whose start conserved quantities are taken, or the first."""
+        held = self.family.held
+        return 0 if held is None else int(held.stretch)
+
+    @property
+    def _free_directions(self) -> np.ndarray:
+        """An orthonormal basis ``(n, n - r)`` of the scaled states across the field and held gradients."""
+        taken = [] if self.family.forced else [self.flows[self._first].first_rate / self.scale]
+        if self.departure is not None:
+            taken += [*self.departure[1][:, : len(self.scale)] * self.scale]
+        if not taken:
+            return np.eye(len(self.scale))
+        rows = np.array([each / (np.linalg.norm(each) or 1.0) for each in taken])
+        return np.linalg.svd(rows)[2][np.linalg.matrix_rank(rows) :].T
+
+    @cached_property
+    def departure(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """How far held quantities are from their values ``(h,)``; None if nothing is held.
+
+        And their derivatives ``(h, n + k + 1)`` in the state at the start of their stretch, in the parameters
+        and in the time there.
+        """
+        family, loop, i = self.family, self.loop, self._first
+        if family.held is None:
+            return None
+        held = attrs.evolve(
+            family.held, parameters=family.vector(loop.values), counters=family.route[i].counters
+        )
+        t, x, n = float(loop.times[i]), loop.x[i], loop.x.shape[1]
+        free = [n + list(family.system.parameters).index(name) for name in family.names]
+        slopes = held.slopes(t, x, self.scale)
+        return held.off(t, x), slopes[:, [*range(n), *free, -1]]
 
     def speed(self, i: int, rate: np.ndarray | None = None) -> float:
         """Speed of the guard at the end of a stretch, along the field there or another rate ``(n,)``."""
@@ -318,6 +381,8 @@ class Pass:
             values[rows] = closed_change(
                 values[rows] - self.loop.x[(i + 1) % count], self.family.system.turn_lengths[:n]
             )
+        if self.departure is not None and anchor.departure is not None:
+            self._hold(*self.departure, anchor.departure[1][:, :n], anchor.scale, matrix, values)
         self._close(anchor, matrix[-1], values, first)
         matrix *= units
         sizes = np.concatenate([np.tile(anchor.scale, count), np.abs(matrix[first:]).max(axis=1)])
@@ -345,6 +410,29 @@ class Pass:
         row[first + begin] -= 1.0 - share
         row[first + end] -= share
         values[first + i] = times[i + 1] - (1.0 - share) * times[begin] - share * times[end]
+
+    def _hold(
+        self,
+        off: np.ndarray,
+        slopes: np.ndarray,
+        gradients: np.ndarray,
+        scale: np.ndarray,
+        matrix: np.ndarray,
+        values: np.ndarray,
+    ) -> None:
+        """Conserved quantities have the values that they are held at.
+
+        Where all other equations hold, the gap along the ``gradients (h, n)`` is zero by itself. The shortest
+        way to the held values, in units of ``scale (n,)``, is put in its place.
+        """
+        count, n = self.loop.x.shape
+        i, first, last = self._first, count * n, count * n + count + 1
+        rows = np.arange(n) + (i - 1) % count * n
+        back = np.linalg.pinv(gradients * scale, rcond=CLOSED) * scale[:, None]
+        kept = np.eye(n) - back @ gradients
+        matrix[rows], values[rows] = kept @ matrix[rows], kept @ values[rows] + back @ off
+        columns = [*range(i * n, (i + 1) * n), *range(last, matrix.shape[1]), first + i]
+        matrix[np.ix_(rows, columns)] += back @ slopes
 
     def _close(self, anchor: Pass, row: np.ndarray, values: np.ndarray, first: int) -> None:
         """The last equation: the period is that of the forcing, or the time of the start is fixed."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import cached_property
 from itertools import pairwise
@@ -13,8 +12,10 @@ import numpy as np
 
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.family import ROUNDING, Family
+from hybrid.orbits.continuation.parts import divided, growth, holding
 from hybrid.orbits.continuation.passing import CLOSED, Pass
-from hybrid.orbits.continuation.route import LARGEST_GROWTH, Loop, Stretch, route_of
+from hybrid.orbits.continuation.route import LARGEST_GROWTH, Loop, route_of
+from hybrid.orbits.held import conserved_at
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver
@@ -246,8 +247,12 @@ def place_on(orbit: Any, names: tuple[str, ...], sizes: np.ndarray, solver: Solv
         orbit = attrs.evolve(orbit, system=aged(orbit.system), x0=x0)
     family = Family(orbit.system, names, dict(orbit.parameters), orbit.forcing_periods, solver, ())
     arc, values = orbit.arc(solver), np.array([orbit.parameters[name] for name in names])
+    held = conserved_at(orbit.system, family.vector(values), orbit.mode, orbit.t0, orbit.x0)
     started = start_of(family, arc, orbit.period, values) if arc.status.ok else None
     place = None if started is None else begun(*started, sizes)
+    if place is not None and held is not None:
+        orbit = holding(place.orbit, held, sizes)
+        place = begun(orbit.family, orbit.loop, sizes)
     if place is None:
         raise ArgumentError(
             "orbit is not found again, stretch by stretch: solve it with tighter tolerances, and see that "
@@ -261,35 +266,12 @@ def start_of(family: Family, arc: HybridArc, period: float, values: np.ndarray) 
     route, x, times = route_of(family.system, arc, period)
     counted = (arc.x[-1] - arc.x[0])[family.n :]
     least = np.abs(arc.x[:, : family.n]).max(axis=0)
-    family = attrs.evolve(family, route=route, counted=counted, least=least)
+    family = attrs.evolve(family, route=route, counted=counted, least=least, held=None)
     first = family.around(Loop(x, times, values))
     if first is None:
         return None
     first = first.parted
-    return _divided(attrs.evolve(first, family=attrs.evolve(first.family, least=first.scale)))
-
-
-def _divided(orbit: Pass) -> tuple[Family, Loop]:
-    """The same orbit with stretches along which no error grows too much."""
-    loop, n = orbit.loop, orbit.loop.x.shape[1]
-    stretches: list[Stretch] = []
-    states, times = [], []
-    for i, (stretch, flow) in enumerate(zip(orbit.family.route, orbit.flows, strict=True)):
-        parts = 1 if stretch.within else max(1, math.ceil(math.log(growth(orbit, i), LARGEST_GROWTH)))
-        shares = np.arange(parts) / parts
-        states.append(np.vstack([loop.x[i], flow.at(shares[1:])]) if parts > 1 else loop.x[i : i + 1])
-        times.append(loop.times[i] + shares * (loop.times[i + 1] - loop.times[i]))
-        stretches += [attrs.evolve(stretch, fired=())] * (parts - 1) + [stretch]
-    family = attrs.evolve(orbit.family, route=tuple(stretches))
-    return family, Loop(
-        np.concatenate(states).reshape(-1, n), np.append(np.concatenate(times), loop.times[-1]), loop.values
-    )
-
-
-def growth(orbit: Pass, i: int) -> float:
-    """By how much an error at the start of a stretch grows up to its end, at least 1."""
-    n, scale = orbit.loop.x.shape[1], orbit.scale
-    return max(1.0, float(np.linalg.norm(orbit.flows[i].slopes[:, :n] / scale[:, None] * scale, 2)))
+    return divided(attrs.evolve(first, family=attrs.evolve(first.family, least=first.scale)))
 
 
 def refined(place: Place) -> Place:
@@ -299,15 +281,15 @@ def refined(place: Place) -> Place:
         growth(orbit, i) < TOO_LARGE * LARGEST_GROWTH for i, stretch in enumerate(route) if not stretch.within
     ):
         return place
-    family, loop = _divided(orbit)
-    divided = family.around(loop)
-    if divided is None:
+    family, loop = divided(orbit)
+    finer = family.around(loop)
+    if finer is None:
         return place
     # The tangent at the points that both have in common says where the way goes on.
     n, k = loop.x.shape[1], len(place.sizes)
     onward = np.zeros((k, len(loop.flat)))
     onward[:, :n], onward[:, -k:] = place.tangents[:, :n], place.tangents[:, -k:]
-    return place_of(divided, onward, place.sizes) or place
+    return place_of(finer, onward, place.sizes) or place
 
 
 def share_of(orbit: Pass, t: float) -> tuple[int, float]:

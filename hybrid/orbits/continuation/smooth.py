@@ -7,9 +7,13 @@ from collections.abc import Callable
 
 import numpy as np
 
+from hybrid.orbits.continuation.passing import CLOSED
 from hybrid.orbits.continuation.place import Place
 
 Test = Callable[[Place], float]
+
+# Distance on either side of a torus at which the pair is looked at.
+APART = 1e-3
 
 
 def fold(place: Place) -> float:
@@ -44,17 +48,24 @@ def _root_of_determinant(matrix: np.ndarray) -> float:
     return float(np.linalg.slogdet(matrix)[0] * np.linalg.svd(matrix, compute_uv=False)[-1])
 
 
+def changes(one: float, other: float) -> bool:
+    """Whether a function changes its sign; one that is zero all along, as orbits close, says nothing."""
+    return one * other < 0.0 and min(abs(one), abs(other)) >= CLOSED
+
+
 TESTS: dict[str, Test] = {"fold": fold, "flip": flip, "torus": torus, "branch point": branch_point}
 
 
 def told(kind: str, place: Place) -> str:
     """What happens at a bifurcation, in words; empty if the multipliers say that it is none."""
     if kind == "torus":
-        multipliers = place.orbit.free_multipliers
-        on_circle = [m for m in multipliers if abs(m.imag) > 1e-6 and abs(abs(m) - 1.0) < 1e-4]
-        if not on_circle:
+        # Two real ones may be inverse to each other, and a pair of a conservative system stays on the circle.
+        beside = [place.step(np.array([sign * APART])) for sign in (1.0, -1.0)]
+        pair, *pairs = (_pair(each) for each in (place, *(made[0] for made in beside if made is not None)))
+        outside = [abs(each) - 1.0 for each in pairs]
+        if pair == 0.0 or len(pairs) < 2 or max(outside) < CLOSED or min(outside) > -CLOSED:
             return ""
-        angle = max(abs(math.atan2(m.imag, m.real)) for m in on_circle)
+        angle = math.atan2(pair.imag, pair.real)
         return f"a pair of multipliers crosses the unit circle at the angle {angle:.6g}"
     if kind == "flip":
         # Where a guard loses its speed a multiplier changes its sign through infinity.
@@ -64,3 +75,9 @@ def told(kind: str, place: Place) -> str:
     if kind == "fold":
         return "the branch turns back in the parameter: a multiplier is 1"
     return "a multiplier is 1, and another branch crosses"
+
+
+def _pair(place: Place) -> complex:
+    """The multiplier above the real axis that is nearest to the unit circle; 0 if there is none."""
+    above = [complex(each) for each in place.orbit.free_multipliers if each.imag > 0.0]
+    return min(above, key=lambda each: abs(abs(each) - 1.0), default=0j)

@@ -20,7 +20,7 @@ from hybrid.orbits.continuation.place import (
     zero_between,
 )
 from hybrid.orbits.continuation.route import Route
-from hybrid.orbits.continuation.smooth import TESTS, branch_point, told
+from hybrid.orbits.continuation.smooth import TESTS, branch_point, changes, told
 from hybrid.simulation.simulate import simulate
 
 # Lengths of steps along the branch, in units of the sizes of the orbit and of the range of the parameter.
@@ -31,7 +31,6 @@ FEW_CORRECTIONS = 3
 LONGER = 1.5
 # An orbit that is larger than the first one by this factor, the square root of rounding, grows without bound.
 UNBOUNDED = 2.0**26
-NOTHING = 1e-12
 # Along the last part of a walk, of this length, the parameter stands still if it changes by this share of its
 # range. The period grows without bound, or becomes zero, if it changes by this factor there.
 LAST_PART = 0.1
@@ -98,7 +97,7 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
             beyond = change.onward.place
             met = (change.routes, last.value)
             again = any(routes == met[0] and abs(value - met[1]) < near for routes, value in passed)
-            if not again:
+            if not again and change.alters:
                 yield Event(change.kind, last, change.told, change)
             if beyond is None or again:
                 yield change.kind
@@ -177,7 +176,7 @@ def _to_the_edge(place: Place, after: Place, low: float, high: float) -> Iterato
 
 def _between(place: Place, after: Place) -> Iterator[Event]:
     """The smooth bifurcations between two places."""
-    changed = [kind for kind, function in TESTS.items() if _changes(function(place), function(after))]
+    changed = [kind for kind, function in TESTS.items() if changes(function(place), function(after))]
     if "branch point" in changed and "fold" in changed:
         # A branch that crosses another one at its turn, as the arms of a pitchfork do.
         changed.remove("fold")
@@ -189,11 +188,6 @@ def _between(place: Place, after: Place) -> Iterator[Event]:
         message = "" if found is None else told(kind, found)
         if found is not None and message:
             yield Event(kind, found, message)
-
-
-def _changes(one: float, other: float) -> bool:
-    """Whether a function changes its sign; one that is zero to rounding all along says nothing."""
-    return one * other < 0.0 and min(abs(one), abs(other)) >= NOTHING
 
 
 def _turned(place: Place, after: Place) -> bool:

@@ -58,7 +58,7 @@ def test_a_branch_of_such_orbits_says_that_nothing_is_held():
     swing = HybridSystem(state=("q", "v"), parameters={"k": 1.0}, modes=[field])
     # Rounding decides which member of the family is next, so how far the steps lead is not asked.
     branch = continue_orbit(periodic_orbit(swing, (1.2, 0.0), period=6.9), "k", (0.9, 1.1), max_steps=100)
-    assert "no conserved quantity is held" in branch.status.message
+    assert "No conserved quantity is held" in branch.status.message
     alone = continue_orbit(periodic_orbit(kicked(), (1.9, 0.1), period=3.9), "e", (0.45, 0.55))
     assert "held" not in alone.status.message
 

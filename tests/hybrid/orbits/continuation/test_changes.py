@@ -144,9 +144,15 @@ def test_a_corner():
     )
     orbit = periodic_orbit(system, (0.5, 1.2), period=1.0)
     branch = continue_orbit(orbit, "cap", (1.4, 2.0))
-    corner = branch.bifurcations[0]
-    assert corner.kind == "corner"
-    assert corner.value == pytest.approx((2 - 2 / np.e) / (1 - 0.5 / np.e), abs=1e-10)
+    again, first = branch.bifurcations
+    assert again.kind == first.kind == "corner"
+    assert first.value == pytest.approx((2 - 2 / np.e) / (1 - 0.5 / np.e), abs=1e-10)
+
+    def twice(cap):
+        """How the times up to the cap, and from below it up to it again, differ from one unit."""
+        return (2 - cap) ** 2 / ((2 - 0.5 * cap) * (2.1 - cap)) - 1 / np.e
+
+    assert again.value == pytest.approx(brentq(twice, 1.4, 1.5), abs=1e-10)
 
 
 def test_an_isola_closes():
