@@ -10,7 +10,7 @@ import numpy as np
 
 from hybrid.orbits.continuation.family import Family
 from hybrid.orbits.continuation.grazing import kick, square_root_coefficient, what_follows
-from hybrid.orbits.continuation.measures import Key, changed, measure_of
+from hybrid.orbits.continuation.measures import MOVING, Key, changed, measure_of
 from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import (
     Place,
@@ -22,7 +22,7 @@ from hybrid.orbits.continuation.place import (
     slides,
     start_of,
 )
-from hybrid.orbits.continuation.route import Route
+from hybrid.orbits.continuation.route import Route, rotations
 from hybrid.simulation.simulate import simulate
 
 # The change is enclosed by so many halvings of a step, each time before it is asked what changes.
@@ -147,12 +147,14 @@ class Change:
     def told(self) -> str:
         """What happens, in words."""
         key, names = self.key, self.place.family.route[self.key.stretch].fired
+        within = key.kind == "when" and key.share != 1.0
+        fires = "its guard is reached" if within else f"{_listed(names)} fires"
         told = {
             "top": f"the orbit touches the guard of {key.name!r}, which does not fire",
             "speed": f"{key.name!r} loses its speed through its guard",
-            "rate": f"where {_listed(names)} fires, the field of {key.name!r} is along the surface",
-            "when": f"the condition of {key.name!r} changes where {_listed(names)} fires",
-            "end": f"the guard of {key.name!r} is reached where {_listed(names)} fires",
+            "rate": f"where {fires}, the field of {key.name!r} is along the surface",
+            "when": f"the condition of {key.name!r} changes where {fires}",
+            "end": f"the guard of {key.name!r} is reached where {fires}",
             "begin": f"a stretch begins on the guard of {key.name!r}",
             "stay": f"the time in {key.name!r} becomes zero",
         }[key.kind]
@@ -237,7 +239,8 @@ def _onward(near: Place, at: Place, key: Key) -> Onward:
     """What comes beyond: the system is asked which other ways it goes from states around the orbit there."""
     slope = np.sign(near.tangents[0, -1])
     known = Onward(None, ([], []), None, None, True)
-    tried = {at.family.route}
+    # The orbit itself, seen from a later start, is none beyond.
+    tried = rotations(at.family.route)
     for farther in FARTHER:
         for asked in _asked(near, at, key, farther):
             family, first, jumps, stretch = asked
@@ -254,7 +257,7 @@ def _onward(near: Place, at: Place, key: Key) -> Onward:
             if found is not None:
                 same_way = bool(np.sign(found.tangents[0, -1]) == slope)
                 return attrs.evolve(known, place=found, same_way=same_way)
-            tried.add(family.route)
+            tried |= rotations(family.route)
     return known
 
 
@@ -336,7 +339,7 @@ def _quiet(orbit: Pass, key: Key) -> tuple[int, float]:
     lasting = [i for i in range(len(stays)) if stays[i] > SHARE_OF_A_STAY * stays.max()]
     free = [i for i in lasting if not slides(orbit, i)] or lasting
     j = max(free, key=lambda i: stays[i])
-    if j == key.stretch and key.kind == "top":
+    if j == key.stretch and key.kind in MOVING and key.share != 1.0:
         return j, key.share / 2 if key.share > 0.5 else (1.0 + key.share) / 2
     return j, 0.5
 

@@ -50,7 +50,7 @@ class CodimensionTwo:
     Attributes
     ----------
     kind
-        ``"cusp"``, ``"fold-flip"``, ``"1:3 resonance"``, ``"1:4 resonance"``, a kind and what meets it there
+        ``"cusp"``, ``"fold-flip"``, ``"1:1 resonance"`` to ``"1:4 resonance"``, a kind and what meets it there
         such as ``"grazing-fold"``, or a kind ``"... at a change"``: the transitions of the orbit change.
     values
         The two parameters by name.

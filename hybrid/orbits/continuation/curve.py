@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import combinations
 
 import attrs
 import numpy as np
 
-from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import Place, is_real, passes_by, zero_on_the_way
 from hybrid.orbits.continuation.smooth import flip, singular, torus
 
@@ -30,16 +30,15 @@ MOST_CORRECTIONS = 8
 BESIDE = 1e-3
 # The parameters stand still at a cusp, to this share of their speed nearby.
 STANDS = 1e-3
-# A pair of multipliers has an angle on the unit circle if it is this far from the real axis.
-REAL = 1e-9
 
 SMOOTH: dict[str, Test] = {"fold": singular, "flip": flip, "torus": torus}
 # A second multiplier like that of the bifurcation: what is added to it, and the kind.
 DOUBLE = {"fold": (-1.0, "1:1 resonance"), "flip": (1.0, "1:2 resonance")}
 # An orbit that is larger than the first one by this factor grows without bound.
 UNBOUNDED = 2.0**26
-# Angles on the unit circle where a torus is resonant, as shares of a turn.
-RESONANCES = {"1:4 resonance": 1 / 4, "1:3 resonance": 1 / 3}
+# Sums of a pair on the unit circle where a torus is resonant; where it is strongly so, the pair becomes real.
+RESONANCES = {"1:4 resonance": 0.0, "1:3 resonance": -1.0}
+STRONG = {"1:1 resonance": 2.0, "1:2 resonance": -2.0}
 
 
 @attrs.frozen(eq=False)
@@ -166,16 +165,20 @@ def along_curve(
             continue
         ended = _ended(curve, after, lows, highs)
         if ended:
-            last = None
-            if ended == "range":
-                last = _zero(curve, spot, after, partial(_outside, lows, highs))
-            if last is None:
+            last = _zero(curve, spot, after, lambda each: max(_excess(curve, each, lows, highs).values()))
+            if last is not None and curve.is_real(last):
+                excess = _excess(curve, last, lows, highs)
+                ended = max(excess, key=lambda each: excess[each])
+            else:
+                ended = ended if last is None else "change"
                 last = _last(curve, spot, length, lambda each: _ended(curve, each, lows, highs) == "")
             yield from _between(curve, spot, last)
             if last is not spot:
                 yield last
             if ended == "change":
                 yield Special(f"{curve.kind} at a change", last, "beyond it the orbit has other transitions")
+            elif ended == "strong resonance":
+                yield Special(_nearest_resonance(last), last, "the multipliers of the torus become real")
             yield ended
             return
         yield from _between(curve, spot, after)
@@ -192,11 +195,18 @@ def along_curve(
 
 def _ended(curve: Curve, spot: Spot, lows: np.ndarray, highs: np.ndarray) -> str:
     """Why the curve has ended at a spot; empty if it has not."""
-    if _outside(lows, highs, spot) > 0.0:
-        return "range"
-    if curve.kind == "torus" and not angle(spot.place.orbit) > 0.0:
-        return "strong resonance"
+    excess = _excess(curve, spot, lows, highs)
+    if max(excess.values()) > 0.0:
+        return max(excess, key=lambda each: excess[each])
     return "" if curve.is_real(spot) else "change"
+
+
+def _excess(curve: Curve, spot: Spot, lows: np.ndarray, highs: np.ndarray) -> dict[str, float]:
+    """How far a spot is beyond each end of its curve; negative on the curve."""
+    excess = {"range": _outside(lows, highs, spot)}
+    if curve.kind == "torus":
+        excess["strong resonance"] = abs(_sum_of_pair(spot)) - 2.0
+    return excess
 
 
 def _outside(lows: np.ndarray, highs: np.ndarray, spot: Spot) -> float:
@@ -205,11 +215,16 @@ def _outside(lows: np.ndarray, highs: np.ndarray, spot: Spot) -> float:
     return float((np.maximum(lows - values, values - highs) / (highs - lows)).max())
 
 
+def _ahead(spot: Spot, after: Spot) -> float:
+    """How far a spot is ahead of another along the tangent of that."""
+    change = after.place.orbit.loop.flat - spot.place.orbit.loop.flat
+    return float(spot.along @ (change / spot.place.units))
+
+
 def _zero(curve: Curve, spot: Spot, after: Spot, function: Callable[[Spot], float]) -> Spot | None:
     """The spot between two where a function of spots changes its sign."""
-    change = after.place.orbit.loop.flat - spot.place.orbit.loop.flat
-    length = float(spot.along @ (change / spot.place.units))
-    found: Spot | None = zero_on_the_way({0.0: spot, length: after}, partial(curve.step, spot), function)
+    known = {0.0: spot, _ahead(spot, after): after}
+    found: Spot | None = zero_on_the_way(known, partial(curve.step, spot), function)
     return found
 
 
@@ -226,16 +241,22 @@ def _last(curve: Curve, spot: Spot, length: float, inside: Callable[[Spot], bool
     return found
 
 
-def angle(orbit: Pass) -> float:
-    """The angle of the pair of multipliers nearest to the unit circle; 0 without a pair."""
-    pairs = [m for m in orbit.free_multipliers if m.imag > REAL]
-    return float(np.angle(min(pairs, key=lambda m: abs(abs(m) - 1.0)))) if pairs else 0.0
+def _sum_of_pair(spot: Spot) -> float:
+    """The sum of the two multipliers whose product is nearest to 1; on the unit circle twice their cosine."""
+    pairs = combinations(spot.place.orbit.free_multipliers, 2)
+    return float(sum(min(pairs, key=lambda each: abs(each[0] * each[1] - 1.0))).real)
 
 
-def _between(curve: Curve, spot: Spot, after: Spot) -> Iterator[Special]:
-    """The points of codimension two between two spots."""
+def _nearest_resonance(spot: Spot) -> str:
+    total = _sum_of_pair(spot)
+    return min(STRONG, key=lambda each: abs(STRONG[each] - total))
+
+
+def _between(curve: Curve, spot: Spot, after: Spot) -> list[Special]:
+    """The points of codimension two between two spots, in their order."""
     if not curve.has_multipliers:
-        return
+        return []
+    special = []
     for kind, function, message in _tests(curve.kind, spot):
         if not function(spot) * function(after) < 0.0:
             continue
@@ -243,14 +264,15 @@ def _between(curve: Curve, spot: Spot, after: Spot) -> Iterator[Special]:
         if found is None:
             continue
         if kind != "cusp" or np.linalg.norm(found.along[-2:]) < STANDS * np.linalg.norm(spot.along[-2:]):
-            yield Special(kind, found, message)
+            special.append(Special(kind, found, message))
+    return sorted(special, key=lambda each: _ahead(spot, each.spot))
 
 
 def _tests(kind: str, spot: Spot) -> Iterator[tuple[str, Callable[[Spot], float], str]]:
     """Functions that are zero at points of codimension two, with their kinds and what happens."""
     if kind == "torus":
-        for name, turn in RESONANCES.items():
-            away = partial(_from_resonance, 2 * np.pi * turn)
+        for name, total in RESONANCES.items():
+            away = partial(_from_resonance, total)
             yield name, away, "the multipliers of the torus are roots of 1"
         return
     if kind in DOUBLE:
@@ -271,8 +293,8 @@ def _others(sign: float, spot: Spot) -> float:
     return float(np.prod(np.delete(values, int(np.argmin(np.abs(values))))).real)
 
 
-def _from_resonance(turn: float, spot: Spot) -> float:
-    return angle(spot.place.orbit) - turn
+def _from_resonance(total: float, spot: Spot) -> float:
+    return _sum_of_pair(spot) - total
 
 
 def _at_spot(test: Test, spot: Spot) -> float:
