@@ -11,7 +11,7 @@ import numpy as np
 from hybrid.orbits.continuation.family import Family
 from hybrid.orbits.continuation.grazing import kick, square_root_coefficient, what_follows
 from hybrid.orbits.continuation.measures import MOVING, Key, changed, measure_of
-from hybrid.orbits.continuation.passing import Pass
+from hybrid.orbits.continuation.passing import CLOSED, Pass
 from hybrid.orbits.continuation.place import (
     Place,
     distance,
@@ -40,7 +40,8 @@ SHARE_OF_A_STAY = 0.02
 FARTHER = (1e-5, 1e-4, 1e-3, 1e-2)
 
 TANGENT = ("top", "speed")
-AT_A_CORNER = ("when", "end", "begin")
+# Events that meet; in the others a field is along a surface.
+AT_A_CORNER = ("when", "end", "begin", "stay")
 
 
 @attrs.frozen(eq=False)
@@ -113,28 +114,41 @@ class Change:
     @cached_property
     def kind(self) -> str:
         """Kind of the bifurcation."""
-        onward, route = self.onward, self.place.family.route
-        routes = [route] if onward.place is None else [route, onward.place.family.route]
-        stays = any(len({mode for each in way for mode in (each.mode, each.end_mode)}) == 1 for way in routes)
-        if self.key.kind in AT_A_CORNER and stays and len(self.place.family.system.modes) > 1:
-            return "border"
-        tangent = {self.key.kind, self.exact.key.kind} & set(TANGENT)
         exact = self.exact
-        if exact.key.kind in TANGENT and kick(exact.place.orbit, exact.key) is not None:
-            return "grazing"
-        passing, i = onward.passing, onward.stretch
+        if exact.key.kind not in AT_A_CORNER:
+            collides = exact.key.kind in TANGENT and kick(exact.place.orbit, exact.key) is not None
+            sliding = None if collides else self._sliding
+            if sliding is not None:
+                return sliding
+            if self._is_tangent:
+                return "grazing"
+        return "corner" if len({_modes(each) for each in self._around}) == 1 else "border"
+
+    @property
+    def _is_tangent(self) -> bool:
+        """Whether a guard is reached without speed."""
+        return bool({self.key.kind, self.exact.key.kind} & set(TANGENT))
+
+    @property
+    def _sliding(self) -> str | None:
+        """Which of the four changes of sliding it is, if it is one."""
+        passing, i = self.onward.passing, self.onward.stretch
         if passing is None or i is None:
-            if tangent and slides(self.place.orbit, self.key.stretch):
-                return "adding-sliding"
-            return "grazing" if tangent else "corner"
+            adds = self._is_tangent and slides(self.place.orbit, self.key.stretch)
+            return "adding-sliding" if adds else None
         count = len(passing.family.route)
         if slides(passing, i):
-            return "grazing-sliding" if tangent else "crossing-sliding"
+            return "grazing-sliding" if self._is_tangent else "crossing-sliding"
         if slides(passing, (i - 1) % count):
             return "adding-sliding"
-        if slides(passing, (i + 1) % count):
-            return "switching-sliding"
-        return "grazing" if tangent else "corner"
+        return "switching-sliding" if slides(passing, (i + 1) % count) else None
+
+    @property
+    def _around(self) -> list[Pass]:
+        """The orbits before, at and beyond it, as far as they are known."""
+        beyond, passing = self.onward.place, self.onward.passing
+        known = (self.before.orbit, self.exact.place.orbit, None if beyond is None else beyond.orbit, passing)
+        return [each for each in known if each is not None]
 
     @cached_property
     def coefficient(self) -> np.ndarray | None:
@@ -170,6 +184,13 @@ class Change:
             return beyond
         follows = what_follows(self.place.orbit.free_multipliers)
         return f"{beyond}; Nordmark's map leaves {follows}" if follows else beyond
+
+
+def _modes(orbit: Pass) -> frozenset[str]:
+    """Names of the modes in which an orbit is for some time."""
+    lasting = np.diff(orbit.loop.times) > CLOSED * orbit.loop.period
+    pairs = zip(orbit.family.route, lasting, strict=True)
+    return frozenset(mode for stretch, lasts in pairs if lasts for mode in (stretch.mode, stretch.end_mode))
 
 
 def _listed(names: tuple[str, ...]) -> str:

@@ -243,8 +243,8 @@ def _last(curve: Curve, spot: Spot, length: float, inside: Callable[[Spot], bool
 
 def _sum_of_pair(spot: Spot) -> float:
     """The sum of the two multipliers whose product is nearest to 1; on the unit circle twice their cosine."""
-    pairs = combinations(spot.place.orbit.free_multipliers, 2)
-    return float(sum(min(pairs, key=lambda each: abs(each[0] * each[1] - 1.0))).real)
+    pairs = np.array([*combinations(spot.place.orbit.free_multipliers, 2)])
+    return float(pairs[np.argmin(np.abs(pairs.prod(axis=1) - 1.0))].sum().real)
 
 
 def _nearest_resonance(spot: Spot) -> str:

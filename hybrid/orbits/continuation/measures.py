@@ -105,15 +105,13 @@ def _of_condition(orbit: Pass, i: int, transition: Transition) -> Iterable[tuple
 
 
 def _reached(orbit: Pass, i: int, transition: Transition) -> list[float]:
-    """Shares of a stretch at which a guard is reached, in its direction; 1 is the end of the stretch."""
-    family, stretch, t = orbit.family, orbit.family.route[i], float(orbit.loop.times[i + 1])
-    found: list[float] = []
-    if stretch.fired and transition.source == stretch.end_mode:
-        end, values = orbit.whole(i, orbit.flows[i].end), orbit.loop.values
-        sizes = np.append(orbit.scale, orbit.loop.period)
-        least = CLOSED * float(np.abs(family.gradient(transition.name, t, end, values)) @ sizes)
-        if abs(family.height(transition.name, t, end, values)) <= least:
-            found.append(1.0)
+    """Shares of a stretch at which a guard is reached, in its direction; 0 and 1 are its ends."""
+    stretch, count = orbit.family.route[i], len(orbit.flows)
+    found = []
+    if stretch.fired and transition.source == stretch.end_mode and _is_reached(orbit, i, transition, 1.0):
+        found.append(1.0)
+    if orbit.family.route[(i - 1) % count].fired and _is_reached(orbit, i, transition, 0.0):
+        found.append(0.0)
     shares = _looked_at(orbit, i)
     heights = None if stretch.within else heights_of(orbit, i, transition, shares)
     if heights is None:
@@ -137,18 +135,23 @@ def _root(orbit: Pass, i: int, transition: Transition, low: float, high: float) 
     return float(brentq(height, low, high, xtol=1e-15))
 
 
+def _is_reached(orbit: Pass, i: int, transition: Transition, share: float) -> bool:
+    """Whether a guard is zero at a share of a stretch, to rounding."""
+    family, values, name = orbit.family, orbit.loop.values, transition.name
+    t, x = _moment(orbit, i, share)
+    sizes = np.append(orbit.scale, orbit.loop.period)
+    least = CLOSED * float(np.abs(family.gradient(name, t, x, values)) @ sizes)
+    return abs(family.height(name, t, x, values)) <= least
+
+
 def _asked(orbit: Pass, i: int, transition: Transition, share: float) -> np.ndarray:
     """The condition of a transition at a share of a stretch, as 1 or -1, and its comparisons."""
-    assert transition.guard.when is not None
-    family, variables = orbit.family, orbit.family.system.variables
-    (t,), (x,) = _moments(orbit, i, np.array([share]))
-    if share == 1.0:
-        x = orbit.whole(i, orbit.flows[i].end)
-    p, x = variables.parameter_view(family.vector(orbit.loop.values)), variables.state_view(x)
+    when, variables = transition.guard.when, orbit.family.system.variables
+    assert when is not None
+    t, whole = _moment(orbit, i, share)
+    p, x = variables.parameter_view(orbit.family.vector(orbit.loop.values)), variables.state_view(whole)
     with np.errstate(all="ignore"):
-        truth, heights = (
-            function(t, x, p) for function in (transition.guard.when, comparisons(transition, variables))
-        )
+        truth, heights = (function(t, x, p) for function in (when, comparisons(transition, variables)))
     return np.array([1.0 if truth > 0 else -1.0, *heights], dtype=float)
 
 
@@ -181,6 +184,13 @@ def heights_of(orbit: Pass, i: int, transition: Transition, shares: np.ndarray) 
         each = [evaluate(variables, transition.guard.function, t, x, values) for t, x in pairs]
         found = np.array([np.nan if value is None else value[0] for value in each])
     return found if np.all(np.isfinite(found)) else None
+
+
+def _moment(orbit: Pass, i: int, share: float) -> tuple[np.float64, np.ndarray]:
+    """Time and whole state at a share of a stretch: at its ends exactly."""
+    (t,), (x,) = _moments(orbit, i, np.array([share]))
+    exact = {0.0: orbit.loop.x[i], 1.0: orbit.flows[i].end}.get(share)
+    return t, x if exact is None else orbit.whole(i, exact)
 
 
 def _moments(orbit: Pass, i: int, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
