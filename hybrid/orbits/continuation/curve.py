@@ -23,8 +23,8 @@ LONGER = 1.5
 LEAST_COSINE = 0.9
 # The slope of the test function is a difference over this distance.
 APART = 1e-4
-# The corrections stop when they are this small.
-CONVERGED = 1e-11
+# A correction this small is the last: what it leaves is its product with the one before, which is rounding.
+SMALL = 1e-8
 MOST_CORRECTIONS = 8
 # What is beside a touch is asked for at this distance from it.
 BESIDE = 1e-3
@@ -117,20 +117,18 @@ class Curve:
             if slope is None:
                 return None
         across = slope / np.linalg.norm(slope)
-        rate, shift, before = float(np.linalg.norm(slope)), 0.0, None
+        rate, shift, before, last = float(np.linalg.norm(slope)), 0.0, None, False
         for _ in range(MOST_CORRECTIONS):
             made = place.step(lengths + shift * across)
-            if made is None:
-                return None
+            if made is None or last:
+                return None if made is None else made[0]
             height = self.test(made[0])
             if before is not None and shift != before[0] and height != before[1]:
                 rate = (height - before[1]) / (shift - before[0])
             change = -height / rate
             if not np.isfinite(change) or abs(change) > LONGEST_STEP:
                 return None
-            if abs(change) < CONVERGED or (before is not None and height == before[1]):
-                return made[0]
-            before, shift = (shift, height), shift + change
+            before, shift, last = (shift, height), shift + change, abs(change) < SMALL
         return None
 
     def _slope(self, place: Place) -> np.ndarray | None:
@@ -155,7 +153,7 @@ def along_curve(
 ) -> Iterator[Spot | Special | str]:
     """Spots along a curve with the special points between them; the last item is why it ends."""
     length, start = FIRST_STEP, spot
-    for number in range(most):
+    for _ in range(most):
         after = curve.step(spot, length)
         if after is None:
             length /= 2.0
@@ -183,7 +181,7 @@ def along_curve(
             return
         yield from _between(curve, spot, after)
         yield after
-        if number > 1 and passes_by(start.place, spot.place, after.place):
+        if spot is not start and passes_by(start.place, spot.place, after.place):
             yield "closed"
             return
         if np.any(after.place.orbit.scale > UNBOUNDED * start.place.orbit.scale):

@@ -252,12 +252,9 @@ def curve_measure_of(key: Key) -> Callable[[Pass], float]:
 
 def _lowest(key: Key, orbit: Pass) -> float:
     """The measure nearest to zero of those that differ only in their places; nan if there is none."""
-    transition = _transition(orbit, key)
-    found = {
-        **dict(_of_guard(orbit, key.stretch, transition)),
-        **dict(_of_condition(orbit, key.stretch, transition)),
-    }
-    same = [value for each, value in found.items() if attrs.evolve(each, share=key.share) == key]
+    found = _of_guard if key.kind == "top" else _of_condition
+    each = found(orbit, key.stretch, _transition(orbit, key))
+    same = [value for other, value in each if attrs.evolve(other, share=key.share) == key]
     return min(same, key=abs, default=np.nan)
 
 
