@@ -181,6 +181,28 @@ class TestAConditionAwayFromJumps:
         np.testing.assert_allclose(curve["u"], 0.4 * (1 - curve["a"] / 2), atol=1e-9)
 
 
+def test_a_condition_on_an_orbit_of_its_own_period():
+    """An oscillator is kicked by ``k`` where it comes to 0 slower than 1: it comes with ``k q / (1 - q)``."""
+    system = HybridSystem(
+        state=("x", "v"),
+        parameters={"k": 0.5, "z": 0.1},
+        modes=[Mode("swing", lambda t, x, p: (x.v, -x.x - 2 * p.z * x.v))],
+        transitions=[
+            Transition(
+                "swing",
+                "swing",
+                Guard(lambda t, x, p: x.x, +1, when=lambda t, x, p: x.v < 1.0),
+                Reset(lambda t, x, p: {"v": x.v + p.k}),
+                name="kick",
+            )
+        ],
+    )
+    (corner,) = continue_orbit(periodic_orbit(system, (0.3, 0.9), period=6.3), "k", (0.2, 3.0)).bifurcations
+    curve = follow(corner, "corner", k=(0.2, 3.0), z=(0.03, 0.3))
+    q = np.exp(-2 * np.pi * curve["z"] / np.sqrt(1 - curve["z"] ** 2))
+    np.testing.assert_allclose(curve["k"] * q / (1 - q), 1.0, atol=1e-9)
+
+
 @pytest.mark.parametrize(("x", "s"), [(-0.3, 1.0), (-0.6, 2.0)])
 def test_a_condition_that_is_asked_after_a_reset_of_its_tick(x, s):
     """``x' = s``, then ``-k x``: that is below -1/2, where a second law acts, for ``s > (1 + k) / (2 k)``."""
