@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import reduce
+from operator import truediv
 from typing import cast
 
 import attrs
@@ -19,6 +21,7 @@ from hybrid.expression.graph import (
     base_and_exponent,
     contains,
     factors_of,
+    in_order,
     is_larger_than,
     mentions,
     nodes_of,
@@ -301,6 +304,19 @@ def _pulse(height: Expression, surfaces: Surfaces) -> Expression | None:
         core, _, orientation = core_of(pulse, surfaces.symbols)
         surfaces.pulses[core] = Sawtooth(over, by, cut, orientation if factor.value > 0 else -orientation)
     return pulse
+
+
+def heights_of(condition: Expression) -> list[Expression]:
+    """Expressions of which one vanishes where a condition, true or positive, changes; innermost first."""
+    whole = condition if isinstance(condition, Truth) else Less(ZERO, condition)
+    found = []
+    for node in in_order([whole]):
+        if isinstance(node, COUNTS):
+            # It jumps at whole numbers, or at halves.
+            found.append(Sin(number(2.0 * math.pi) * reduce(truediv, node.args)))
+        elif isinstance(node, SWITCHING) and not isinstance(node, Equal):
+            found.append(_height(node)[0])
+    return found
 
 
 def _height(atom: Expression) -> tuple[Expression, Expression | None]:

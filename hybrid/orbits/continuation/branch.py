@@ -32,8 +32,9 @@ class Bifurcation:
         Smooth ones: ``"fold"``, ``"flip"`` (period doubling), ``"torus"`` (Neimark-Sacker),
         ``"branch point"``.
         Where the sequence of transitions changes: ``"grazing"`` (a guard is touched without speed),
-        ``"corner"`` (two guards are met at one point), ``"border"`` (an orbit that does not switch
-        begins to), ``"crossing-sliding"``, ``"grazing-sliding"``, ``"switching-sliding"``,
+        ``"corner"`` (two guards are met at one point, or the condition of a guard changes where it is
+        reached), ``"border"`` (the same, and the orbit is in some mode on one side alone),
+        ``"crossing-sliding"``, ``"grazing-sliding"``, ``"switching-sliding"``,
         ``"adding-sliding"``.
     parameter, value
         Name of the parameter, and its value there.

@@ -11,9 +11,9 @@ import numpy as np
 from hybrid.orbits.continuation.family import Family
 from hybrid.orbits.continuation.grazing import kick, square_root_coefficient, what_follows
 from hybrid.orbits.continuation.instants import is_repeated
-from hybrid.orbits.continuation.measures import Key, changed, measure_of
+from hybrid.orbits.continuation.measures import MOVING, Key, changed, measure_of
 from hybrid.orbits.continuation.parts import holding
-from hybrid.orbits.continuation.passing import Pass
+from hybrid.orbits.continuation.passing import CLOSED, Pass
 from hybrid.orbits.continuation.place import (
     BESIDE,
     Place,
@@ -25,7 +25,7 @@ from hybrid.orbits.continuation.place import (
     slides,
     start_of,
 )
-from hybrid.orbits.continuation.route import Route
+from hybrid.orbits.continuation.route import Route, rotations
 from hybrid.orbits.continuation.seams import is_same_motion
 from hybrid.simulation.simulate import simulate
 
@@ -44,7 +44,8 @@ SHARE_OF_A_STAY = 0.02
 FARTHER = (1e-5, 1e-4, 1e-3, 1e-2)
 
 TANGENT = ("top", "speed")
-AT_A_CORNER = ("when", "end", "begin")
+# Events that meet; in the others a field is along a surface.
+AT_A_CORNER = ("when", "end", "begin", "stay")
 
 
 @attrs.frozen(eq=False)
@@ -123,28 +124,41 @@ class Change:
     @cached_property
     def kind(self) -> str:
         """Kind of the bifurcation."""
-        onward, route = self.onward, self.place.family.route
-        routes = [route] if onward.place is None else [route, onward.place.family.route]
-        stays = any(len({mode for each in way for mode in (each.mode, each.end_mode)}) == 1 for way in routes)
-        if self.key.kind in AT_A_CORNER and stays and len(self.place.family.system.modes) > 1:
-            return "border"
-        tangent = {self.key.kind, self.exact.key.kind} & set(TANGENT)
         exact = self.exact
-        if exact.key.kind in TANGENT and kick(exact.place.orbit, exact.key) is not None:
-            return "grazing"
-        passing, i = onward.passing, onward.stretch
+        if exact.key.kind not in AT_A_CORNER:
+            collides = exact.key.kind in TANGENT and kick(exact.place.orbit, exact.key) is not None
+            sliding = None if collides else self._sliding
+            if sliding is not None:
+                return sliding
+            if self._is_tangent:
+                return "grazing"
+        return "corner" if len({_modes(each) for each in self._around}) == 1 else "border"
+
+    @property
+    def _is_tangent(self) -> bool:
+        """Whether a guard is reached without speed."""
+        return bool({self.key.kind, self.exact.key.kind} & set(TANGENT))
+
+    @property
+    def _sliding(self) -> str | None:
+        """Which of the four changes of sliding it is, if it is one."""
+        passing, i = self.onward.passing, self.onward.stretch
         if passing is None or i is None:
-            if tangent and slides(self.place.orbit, self.key.stretch):
-                return "adding-sliding"
-            return "grazing" if tangent else "corner"
+            adds = self._is_tangent and slides(self.place.orbit, self.key.stretch)
+            return "adding-sliding" if adds else None
         count = len(passing.family.route)
         if slides(passing, i):
-            return "grazing-sliding" if tangent else "crossing-sliding"
+            return "grazing-sliding" if self._is_tangent else "crossing-sliding"
         if slides(passing, (i - 1) % count):
             return "adding-sliding"
-        if slides(passing, (i + 1) % count):
-            return "switching-sliding"
-        return "grazing" if tangent else "corner"
+        return "switching-sliding" if slides(passing, (i + 1) % count) else None
+
+    @property
+    def _around(self) -> list[Pass]:
+        """The orbits before, at and beyond it, as far as they are known."""
+        beyond, passing = self.onward.place, self.onward.passing
+        known = (self.before.orbit, self.exact.place.orbit, None if beyond is None else beyond.orbit, passing)
+        return [each for each in known if each is not None]
 
     @cached_property
     def coefficient(self) -> np.ndarray | None:
@@ -157,12 +171,14 @@ class Change:
     def told(self) -> str:
         """What happens, in words."""
         key, names = self.key, self.place.family.route[self.key.stretch].fired
+        within = key.kind == "when" and key.share != 1.0
+        fires = "its guard is reached" if within else f"{_listed(names)} fires"
         told = {
             "top": f"the orbit touches the guard of {key.name!r}, which does not fire",
             "speed": f"{key.name!r} loses its speed through its guard",
-            "rate": f"where {_listed(names)} fires, the field of {key.name!r} is along the surface",
-            "when": f"the condition of {key.name!r} changes where {_listed(names)} fires",
-            "end": f"the guard of {key.name!r} is reached where {_listed(names)} fires",
+            "rate": f"where {fires}, the field of {key.name!r} is along the surface",
+            "when": f"the condition of {key.name!r} changes where {fires}",
+            "end": f"the guard of {key.name!r} is reached where {fires}",
             "begin": f"a stretch begins on the guard of {key.name!r}",
             "stay": f"the time in {key.name!r} becomes zero",
         }[key.kind]
@@ -178,6 +194,13 @@ class Change:
             return beyond
         follows = what_follows(self.place.orbit.free_multipliers)
         return f"{beyond}; Nordmark's map leaves {follows}" if follows else beyond
+
+
+def _modes(orbit: Pass) -> frozenset[str]:
+    """Names of the modes in which an orbit is for some time."""
+    lasting = np.diff(orbit.loop.times) > CLOSED * orbit.loop.period
+    pairs = zip(orbit.family.route, lasting, strict=True)
+    return frozenset(mode for stretch, lasts in pairs if lasts for mode in (stretch.mode, stretch.end_mode))
 
 
 def _listed(names: tuple[str, ...]) -> str:
@@ -256,10 +279,12 @@ def _onward(near: Place, at: Place, key: Key) -> Onward:
     """What comes beyond: the system is asked which other ways it goes from states around the orbit there."""
     slope = np.sign(near.tangents[0, -1])
     known = Onward(None, ([], []), None, None, True)
+    # The orbit itself, seen from a later start, is none beyond.
+    itself = rotations(at.family.route)
     for farther in FARTHER:
         for asked in _asked(near, at, key, farther):
             family, first, jumps, stretch = asked
-            if family.route == at.family.route:
+            if family.route in itself:
                 continue
             more = len(jumps[1]) >= len(jumps[0])
             known = Onward(None, jumps, first if more else near.orbit, stretch, True)
@@ -357,7 +382,7 @@ def _quiet(orbit: Pass, key: Key) -> tuple[int, float]:
     lasting = [i for i in range(len(stays)) if stays[i] > SHARE_OF_A_STAY * stays.max()]
     free = [i for i in lasting if not slides(orbit, i)] or lasting
     j = max(free, key=lambda i: stays[i])
-    if j == key.stretch and key.kind == "top":
+    if j == key.stretch and key.kind in MOVING and key.share != 1.0:
         return j, key.share / 2 if key.share > 0.5 else (1.0 + key.share) / 2
     return j, 0.5
 

@@ -50,8 +50,9 @@ class CodimensionTwo:
     Attributes
     ----------
     kind
-        ``"cusp"``, ``"fold-flip"``, ``"1:3 resonance"``, ``"1:4 resonance"``, a kind and what meets it there
-        such as ``"grazing-fold"``, or a kind ``"... at a change"``: the transitions of the orbit change.
+        ``"cusp"``, ``"fold-flip"``, ``"1:1 resonance"``, ``"1:2 resonance"``, ``"1:3 resonance"``,
+        ``"1:4 resonance"``, a kind and what meets it there such as ``"grazing-fold"``, or a kind
+        ``"... at a change"``: the transitions of the orbit change.
     values
         The two parameters by name.
     orbit, message
@@ -169,7 +170,7 @@ def continue_bifurcation(
 
     The orbits of two parameters form a surface. The curve is where the test function of the bifurcation is
     zero on it: of a fold, a flip or a torus the same as in :func:`hybrid.continue_orbit`, and where the
-    transitions change the height, speed or time that vanishes there.
+    transitions change the height, speed, time or comparison of a condition that vanishes there.
 
     Parameters
     ----------

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
+from itertools import combinations
 
 import attrs
 import numpy as np
 
 from hybrid.orbits.continuation.instants import passes_by
-from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import Place, is_real, zero_on_the_way
 from hybrid.orbits.continuation.smooth import changes, flip, singular, torus
 
@@ -24,23 +24,22 @@ LONGER = 1.5
 LEAST_COSINE = 0.9
 # The slope of the test function is a difference over this distance.
 APART = 1e-4
-# The corrections stop when they are this small.
-CONVERGED = 1e-11
+# A correction this small is the last: what it leaves is its product with the one before, which is rounding.
+SMALL = 1e-8
 MOST_CORRECTIONS = 8
 # What is beside a touch is asked for at this distance from it.
 BESIDE = 1e-3
 # The parameters stand still at a cusp, to this share of their speed nearby.
 STANDS = 1e-3
-# A pair of multipliers has an angle on the unit circle if it is this far from the real axis.
-REAL = 1e-9
 
 SMOOTH: dict[str, Test] = {"fold": singular, "flip": flip, "torus": torus}
 # A second multiplier like that of the bifurcation: what is added to it, and the kind.
 DOUBLE = {"fold": (-1.0, "1:1 resonance"), "flip": (1.0, "1:2 resonance")}
 # An orbit that is larger than the first one by this factor grows without bound.
 UNBOUNDED = 2.0**26
-# Angles on the unit circle where a torus is resonant, as shares of a turn.
-RESONANCES = {"1:4 resonance": 1 / 4, "1:3 resonance": 1 / 3}
+# Sums of a pair on the unit circle where a torus is resonant; where it is strongly so, the pair becomes real.
+RESONANCES = {"1:4 resonance": 0.0, "1:3 resonance": -1.0}
+STRONG = {"1:1 resonance": 2.0, "1:2 resonance": -2.0}
 
 
 @attrs.frozen(eq=False)
@@ -119,20 +118,18 @@ class Curve:
             if slope is None:
                 return None
         across = slope / np.linalg.norm(slope)
-        rate, shift, before = float(np.linalg.norm(slope)), 0.0, None
+        rate, shift, before, last = float(np.linalg.norm(slope)), 0.0, None, False
         for _ in range(MOST_CORRECTIONS):
             made = place.step(lengths + shift * across)
-            if made is None:
-                return None
+            if made is None or last:
+                return None if made is None else made[0]
             height = self.test(made[0])
             if before is not None and shift != before[0] and height != before[1]:
                 rate = (height - before[1]) / (shift - before[0])
             change = -height / rate
             if not np.isfinite(change) or abs(change) > LONGEST_STEP:
                 return None
-            if abs(change) < CONVERGED or (before is not None and height == before[1]):
-                return made[0]
-            before, shift = (shift, height), shift + change
+            before, shift, last = (shift, height), shift + change, abs(change) < SMALL
         return None
 
     def _slope(self, place: Place) -> np.ndarray | None:
@@ -157,7 +154,7 @@ def along_curve(
 ) -> Iterator[Spot | Special | str]:
     """Spots along a curve with the special points between them; the last item is why it ends."""
     length, start = FIRST_STEP, spot
-    for number in range(most):
+    for _ in range(most):
         after = curve.step(spot, length)
         if after is None:
             length /= 2.0
@@ -167,21 +164,25 @@ def along_curve(
             continue
         ended = _ended(curve, after, lows, highs)
         if ended:
-            last = None
-            if ended == "range":
-                last = _zero(curve, spot, after, partial(_outside, lows, highs))
-            if last is None:
+            last = _zero(curve, spot, after, lambda each: max(_excess(curve, each, lows, highs).values()))
+            if last is not None and curve.is_real(last):
+                excess = _excess(curve, last, lows, highs)
+                ended = max(excess, key=lambda each: excess[each])
+            else:
+                ended = ended if last is None else "change"
                 last = _last(curve, spot, length, lambda each: _ended(curve, each, lows, highs) == "")
             yield from _between(curve, spot, last)
             if last is not spot:
                 yield last
             if ended == "change":
                 yield Special(f"{curve.kind} at a change", last, "beyond it the orbit has other transitions")
+            elif ended == "strong resonance":
+                yield Special(_nearest_resonance(last), last, "the multipliers of the torus become real")
             yield ended
             return
         yield from _between(curve, spot, after)
         yield after
-        if number > 1 and passes_by(start.place, spot.place, after.place) is not None:
+        if spot is not start and passes_by(start.place, spot.place, after.place) is not None:
             yield "closed"
             return
         if np.any(after.place.orbit.scale > UNBOUNDED * start.place.orbit.scale):
@@ -193,11 +194,18 @@ def along_curve(
 
 def _ended(curve: Curve, spot: Spot, lows: np.ndarray, highs: np.ndarray) -> str:
     """Why the curve has ended at a spot; empty if it has not."""
-    if _outside(lows, highs, spot) > 0.0:
-        return "range"
-    if curve.kind == "torus" and not angle(spot.place.orbit) > 0.0:
-        return "strong resonance"
+    excess = _excess(curve, spot, lows, highs)
+    if max(excess.values()) > 0.0:
+        return max(excess, key=lambda each: excess[each])
     return "" if curve.is_real(spot) else "change"
+
+
+def _excess(curve: Curve, spot: Spot, lows: np.ndarray, highs: np.ndarray) -> dict[str, float]:
+    """How far a spot is beyond each end of its curve; negative on the curve."""
+    excess = {"range": _outside(lows, highs, spot)}
+    if curve.kind == "torus":
+        excess["strong resonance"] = abs(_sum_of_pair(spot)) - 2.0
+    return excess
 
 
 def _outside(lows: np.ndarray, highs: np.ndarray, spot: Spot) -> float:
@@ -206,11 +214,16 @@ def _outside(lows: np.ndarray, highs: np.ndarray, spot: Spot) -> float:
     return float((np.maximum(lows - values, values - highs) / (highs - lows)).max())
 
 
+def _ahead(spot: Spot, after: Spot) -> float:
+    """How far a spot is ahead of another along the tangent of that."""
+    change = after.place.orbit.loop.flat - spot.place.orbit.loop.flat
+    return float(spot.along @ (change / spot.place.units))
+
+
 def _zero(curve: Curve, spot: Spot, after: Spot, function: Callable[[Spot], float]) -> Spot | None:
     """The spot between two where a function of spots changes its sign."""
-    change = after.place.orbit.loop.flat - spot.place.orbit.loop.flat
-    length = float(spot.along @ (change / spot.place.units))
-    found: Spot | None = zero_on_the_way({0.0: spot, length: after}, partial(curve.step, spot), function)
+    known = {0.0: spot, _ahead(spot, after): after}
+    found: Spot | None = zero_on_the_way(known, partial(curve.step, spot), function)
     return found
 
 
@@ -227,16 +240,22 @@ def _last(curve: Curve, spot: Spot, length: float, inside: Callable[[Spot], bool
     return found
 
 
-def angle(orbit: Pass) -> float:
-    """The angle of the pair of multipliers nearest to the unit circle; 0 without a pair."""
-    pairs = [m for m in orbit.free_multipliers if m.imag > REAL]
-    return float(np.angle(min(pairs, key=lambda m: abs(abs(m) - 1.0)))) if pairs else 0.0
+def _sum_of_pair(spot: Spot) -> float:
+    """The sum of the two multipliers whose product is nearest to 1; on the unit circle twice their cosine."""
+    pairs = np.array([*combinations(spot.place.orbit.free_multipliers, 2)])
+    return float(pairs[np.argmin(np.abs(pairs.prod(axis=1) - 1.0))].sum().real)
 
 
-def _between(curve: Curve, spot: Spot, after: Spot) -> Iterator[Special]:
-    """The points of codimension two between two spots."""
+def _nearest_resonance(spot: Spot) -> str:
+    total = _sum_of_pair(spot)
+    return min(STRONG, key=lambda each: abs(STRONG[each] - total))
+
+
+def _between(curve: Curve, spot: Spot, after: Spot) -> list[Special]:
+    """The points of codimension two between two spots, in their order."""
     if not curve.has_multipliers:
-        return
+        return []
+    special = []
     for kind, function, message in _tests(curve.kind, spot):
         if not changes(function(spot), function(after)):
             continue
@@ -244,14 +263,15 @@ def _between(curve: Curve, spot: Spot, after: Spot) -> Iterator[Special]:
         if found is None:
             continue
         if kind != "cusp" or np.linalg.norm(found.along[-2:]) < STANDS * np.linalg.norm(spot.along[-2:]):
-            yield Special(kind, found, message)
+            special.append(Special(kind, found, message))
+    return sorted(special, key=lambda each: _ahead(spot, each.spot))
 
 
 def _tests(kind: str, spot: Spot) -> Iterator[tuple[str, Callable[[Spot], float], str]]:
     """Functions that are zero at points of codimension two, with their kinds and what happens."""
     if kind == "torus":
-        for name, turn in RESONANCES.items():
-            away = partial(_from_resonance, 2 * np.pi * turn)
+        for name, total in RESONANCES.items():
+            away = partial(_from_resonance, total)
             yield name, away, "the multipliers of the torus are roots of 1"
         return
     if kind in DOUBLE:
@@ -275,8 +295,8 @@ def _others(sign: float, spot: Spot) -> float:
     return float(np.polyval(np.polyder(polynomial), -sign).real)
 
 
-def _from_resonance(turn: float, spot: Spot) -> float:
-    return angle(spot.place.orbit) - turn
+def _from_resonance(total: float, spot: Spot) -> float:
+    return _sum_of_pair(spot) - total
 
 
 def _at_spot(test: Test, spot: Spot) -> float:

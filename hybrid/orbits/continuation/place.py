@@ -403,6 +403,10 @@ def _instants(events: list[_Event], least: float) -> list[list[_Event]]:
 
 
 def _same(made: list[_Event], wanted: list[_Event]) -> bool:
-    """Whether the jumps of an instant are those wanted: events that meet there may come in any order."""
+    """Whether the jumps of an instant are those wanted.
+
+    Events that meet there may come in any order, then by as many other transitions to the same mode.
+    """
     names = [[name for event in events for name in event.names] for events in (made, wanted)]
-    return names[0] == names[1] or (len(wanted) > 1 and made[-1].mode == wanted[-1].mode)
+    meet = len(wanted) > 1 and len(names[0]) == len(names[1])
+    return names[0] == names[1] or (meet and made[-1].mode == wanted[-1].mode)

@@ -43,6 +43,11 @@ class Stretch:
 Route = tuple[Stretch, ...]
 
 
+def rotations(route: Route) -> set[Route]:
+    """The route as it is from each of its stretches on."""
+    return {(*route[i:], *route[:i]) for i in range(len(route))}
+
+
 @attrs.frozen(eq=False)
 class Loop:
     """Unknowns of an orbit of ``S`` stretches.

@@ -15,6 +15,7 @@ from hybrid import (
     continue_bifurcation,
     continue_orbit,
     periodic_orbit,
+    simulate,
 )
 
 
@@ -84,6 +85,52 @@ def test_a_torus_passes_its_resonances():
     np.testing.assert_allclose(curve["m"], 1.0, atol=1e-9)
     found = {each.kind: each.values["turn"] for each in curve.points}
     assert found == pytest.approx({"1:4 resonance": 0.25, "1:3 resonance": 1 / 3}, abs=1e-9)
+
+
+class TestResonancesAtTheEnds:
+    """``(x, y) -> (y, a y + b x - y^3 / 10)``: at ``b = -1`` the pair has the sum ``a``."""
+
+    @pytest.fixture(scope="class")
+    @classmethod
+    def torus(cls):
+        system = once_per_unit(
+            ("x", "y"), {"a": 0.5, "b": -0.5}, lambda x, p: (x.y, p.a * x.y + p.b * x.x - 0.1 * x.y**3)
+        )
+        orbit = periodic_orbit(system, (0.4, 0.0, 0.0), period=1.0)
+        return continue_orbit(orbit, "b", (-1.5, 0.0)).bifurcations[0]
+
+    def test_all_four_in_their_order(self, torus):
+        curve = continue_bifurcation(torus, {"a": (-2.5, 2.5), "b": (-1.5, 0.0)})
+        assert curve.status.ok
+        points = sorted(curve.points, key=lambda each: each.values["a"])
+        assert [*curve.points] in (points, points[::-1])
+        assert [each.kind for each in points] == [f"1:{n} resonance" for n in (2, 3, 4, 1)]
+        assert [each.values["a"] for each in points] == pytest.approx([-2.0, -1.0, 0.0, 2.0], abs=1e-8)
+        assert [each.values["b"] for each in points] == pytest.approx([-1.0] * 4, abs=1e-8)
+        assert [curve["a"].min(), curve["a"].max()] == pytest.approx([-2.0, 2.0], abs=1e-8)
+
+    def test_a_range_that_ends_before_is_no_resonance(self, torus):
+        """The next step would be beyond both ends."""
+        curve = continue_bifurcation(torus, {"a": (-1.99, 1.99), "b": (-1.5, 0.0)})
+        assert sorted(each.kind for each in curve.points) == ["1:3 resonance", "1:4 resonance"]
+        assert [curve["a"].min(), curve["a"].max()] == pytest.approx([-1.99, 1.99], abs=1e-9)
+
+
+def test_one_curve_has_both_tori_of_the_founding_system():
+    """Its branch at P = 500 has two; the curve of one goes through the other."""
+    system = models.vibroimpact()
+    arc = simulate(system, (0.0, 0.02, 0.0, 0.0), (0.0, 600 * 2 * np.pi / 7.40))
+    orbit = periodic_orbit(system, arc.x[-1], mode=str(arc.mode[-1]))
+    first, second = continue_orbit(orbit, "omega", (6.5, 8.5)).bifurcations
+    curve = continue_bifurcation(first, {"omega": (6.5, 8.5), "P": (100.0, 900.0)})
+    assert curve.status.ok
+    (end,) = curve.points
+    assert end.kind == "1:1 resonance"
+    omega, P = curve["omega"], curve["P"]
+    across = (P[:-1] - 500.0) * (P[1:] - 500.0) < 0.0
+    (i,) = np.flatnonzero(across & (omega[:-1] > 7.7))
+    share = (500.0 - P[i]) / (P[i + 1] - P[i])
+    assert omega[i] + share * (omega[i + 1] - omega[i]) == pytest.approx(second.value, abs=1e-3)
 
 
 @pytest.fixture(scope="module")
