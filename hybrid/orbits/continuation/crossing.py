@@ -9,10 +9,11 @@ from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import Place, is_real
 from hybrid.orbits.continuation.route import Loop
 
-# The first orbit is this far from where the branches meet, in units of its size, or nearer by halves. There
-# is one half way, too: it begins there.
+# The first orbit is this far from where the branches meet, in units of its size, or nearer. There is one half
+# way, too: it begins there. The other branch goes on across the first, aside by so many times this distance.
 DISTANCE = 0.02
 NEAREST = 1e-6
+ASIDE = 8.0
 # Distance at which the parameter of a fold is compared with that at the fold.
 APART = 1e-3
 
@@ -40,12 +41,12 @@ def crossing(place: Place, times: int) -> Pass | None:
 
     distance = DISTANCE
     while distance > NEAREST:
-        made = near(distance * direction, np.inf)
+        made = near(distance * direction, ASIDE * distance)
         if made is not None:
             change = (made.loop.flat - orbit.loop.flat) / units
             if near(0.5 * change, 0.25 * float(np.abs(change).max())) is not None:
                 return made
-        distance /= 2.0
+        distance /= 4.0
     return None
 
 
