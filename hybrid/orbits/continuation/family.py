@@ -32,7 +32,7 @@ CONVERGED = 1e-12
 MOST_CORRECTIONS = 8
 # Each correction is at most this share of the one before it, or this share of how far an orbit may be.
 CONTRACTION = 0.5
-NEGLIGIBLE = 1e-3
+NEGLIGIBLE = 1e-2
 # Relative step of the difference that gives the slope of a period that cannot be traced.
 STEP = 1e-5
 MOST_JUMPS = 100_000

@@ -32,22 +32,38 @@ def divided(orbit: Pass) -> tuple[Family, Loop]:
 
 
 def _in_parts(orbit: Pass, numbers: list[int]) -> tuple[Family, Loop]:
-    """The same orbit with each stretch in so many parts."""
-    loop, n, held = orbit.loop, orbit.loop.x.shape[1], orbit.family.held
+    """The same orbit with each stretch in so many parts, which take the same time between two jumps."""
+    loop, route, n, held = orbit.loop, orbit.family.route, orbit.loop.x.shape[1], orbit.family.held
     stretches: list[Stretch] = []
-    states, times = [], []
-    for i, (stretch, flow) in enumerate(zip(orbit.family.route, orbit.flows, strict=True)):
-        parts = numbers[i]
-        shares = np.arange(parts) / parts
-        states.append(np.vstack([loop.x[i], flow.at(shares[1:])]) if parts > 1 else loop.x[i : i + 1])
-        times.append(loop.times[i] + shares * (loop.times[i + 1] - loop.times[i]))
-        stretches += [attrs.evolve(stretch, fired=())] * (parts - 1) + [stretch]
+    states, times, first = [], [], 0
+    for i, stretch in enumerate(route):
+        if not stretch.fired and i + 1 < len(route):
+            continue
+        count = sum(numbers[first : i + 1])
+        if count == i + 1 - first:
+            states.append(loop.x[first : i + 1])
+            times.append(loop.times[first : i + 1])
+            stretches += route[first : i + 1]
+        else:
+            begins = np.linspace(loop.times[first], loop.times[i + 1], count, endpoint=False)
+            states.append(np.vstack([loop.x[first], *(_state_at(orbit, t) for t in begins[1:])]))
+            times.append(begins)
+            stretches += [attrs.evolve(route[first], fired=())] * (count - 1) + [stretch]
+        first = i + 1
     if held is not None:
         held = attrs.evolve(held, stretch=sum(numbers[: held.stretch]))
     family = attrs.evolve(orbit.family, route=tuple(stretches), held=held)
     return family, Loop(
         np.concatenate(states).reshape(-1, n), np.append(np.concatenate(times), loop.times[-1]), loop.values
     )
+
+
+def _state_at(orbit: Pass, t: float) -> np.ndarray:
+    """The state ``(n,)`` at a time within one of the stretches."""
+    times = orbit.loop.times
+    i = int(np.searchsorted(times[1:-1], t, side="right"))
+    share = (t - times[i]) / (times[i + 1] - times[i])
+    return np.asarray(orbit.flows[i].at(np.array([share]))[0])
 
 
 def holding(orbit: Pass, held: Held, sizes: np.ndarray) -> Pass:
