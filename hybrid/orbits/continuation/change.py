@@ -309,7 +309,7 @@ def _away(place: Place, at: Place, length: float) -> Place | None:
     found = []
     for sign in (1.0, -1.0):
         made = place.step(np.array([sign * length]))
-        if made is not None and is_real(made[0].orbit):
+        if made is not None and is_real(made[0].orbit) and not made[0].orbit.is_point:
             found.append(attrs.evolve(made[0], tangents=sign * made[0].tangents))
     return max(found, key=lambda each: abs(each.value - at.value), default=None)
 

@@ -44,7 +44,7 @@ ENDS = {
     "chatter": "an orbit whose chatter becomes incomplete",
     "family": "orbits that all have one value of the parameter",
     "most": "the limit of steps",
-    "lost": "Newton's method finds no orbit farther on",
+    "lost": "an orbit beyond which Newton's method finds none",
 }
 
 MANY = (
@@ -216,7 +216,7 @@ def branch_of(items: list[Item], points: Points) -> Branch:
         parameter=np.array([place.value for place in places]),
         x0=np.array([moment(each, *at)[1] for each, at in zip(passes, where, strict=True)]),
         mode=np.array([mode_at(each, *at) for each, at in zip(passes, where, strict=True)]),
-        period=np.array([each.loop.period for each in passes]),
+        period=np.array([each.period for each in passes]),
         multipliers=np.array([each.multipliers for each in passes]),
         stable=np.array([stable[id(place)] for place in places]),
         bifurcations=tuple(

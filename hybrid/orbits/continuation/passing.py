@@ -15,6 +15,8 @@ from hybrid.system.periodicity import closed_change
 
 # The gap of each equation counts as closed at this share of the sizes.
 CLOSED = 1e-10
+# An orbit is a point below this share of its size: the root of rounding, as sizes shrink like roots.
+NO_SIZE = 2.0**-26
 # Places of a stretch at which the size of the states is taken.
 LOOKED_AT = 17
 # A stretch of a neighbour may take so many times the steps of the longest, and so many besides.
@@ -106,6 +108,18 @@ class Pass:
         shares = np.linspace(0.0, 1.0, LOOKED_AT)
         states = [flow.at(shares) for flow in self.flows if flow.arc is not None]
         return np.asarray(np.abs(np.concatenate([self.loop.x, *states])).max(axis=0))
+
+    @cached_property
+    def is_point(self) -> bool:
+        """Whether nothing moves along it: an equilibrium of an autonomous system is no orbit."""
+        shares = np.linspace(0.0, 1.0, LOOKED_AT)
+        states = np.concatenate([self.loop.x, *(flow.at(shares) for flow in self.flows)])
+        return not self.family.forced and bool(np.all(np.ptp(states, axis=0) <= NO_SIZE * self.scale))
+
+    @property
+    def period(self) -> float:
+        """Time until it closes: that of the forcing exactly."""
+        return self.family.period(self.loop.values) if self.family.forced else self.loop.period
 
     @property
     def steps_allowed(self) -> int:

@@ -110,9 +110,11 @@ class Place:
 
 def at_value(place: Place, value: float) -> Place | None:
     """The place at a value of the first parameter, beside one that has it but for rounding."""
-    loop, held = place.orbit.loop, np.eye(len(place.units))[-len(place.sizes) :][:1]
+    loop, units = place.orbit.loop, place.units.copy()
     there = attrs.evolve(loop, values=np.append(value, loop.values[1:]))
-    made = place.family.corrected(there, place.orbit, place.units, held)
+    # An unknown without a unit stays as it is, also where other orbits are beside this one.
+    units[-len(place.sizes)] = np.finfo(float).tiny
+    made = place.family.corrected(there, place.orbit, units)
     return None if made is None else place_of(made[0], place.tangents, place.sizes)
 
 
@@ -265,7 +267,11 @@ def start_of(family: Family, arc: HybridArc, period: float, values: np.ndarray) 
     """The family and the unknowns of the orbit that a run over one period shows; None if it has no value."""
     route, x, times = route_of(family.system, arc, period)
     counted = (arc.x[-1] - arc.x[0])[family.n :]
-    least = np.abs(arc.x[:, : family.n]).max(axis=0)
+    least = np.maximum(np.abs(arc.x[:, : family.n]).max(axis=0), family.least)
+    if family.forced:
+        # Where the period depends on a parameter a late start would move through the phases with it.
+        forcing = family.period(values) / family.periods
+        times = times - forcing * np.floor(times[0] / forcing)
     family = attrs.evolve(family, route=route, counted=counted, least=least, held=None)
     first = family.around(Loop(x, times, values))
     if first is None:

@@ -93,7 +93,7 @@ def _orbit_from(orbit: Pass, i: int, share: float, t0: float) -> PeriodicOrbit:
         x0=x,
         mode=mode,
         t0=t0 if family.forced else t,
-        period=loop.period,
+        period=orbit.period,
         multipliers=multipliers,
         log_moduli=moduli,
         fundamental=fundamental_at(orbit, i, share),

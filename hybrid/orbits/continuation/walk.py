@@ -77,7 +77,7 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
             yield "lost"
             return
         last = after if change is None else change.place
-        if _turned(place, last):
+        if last.orbit.is_point or _turned(place, last):
             yield "equilibrium"
             return
         if _comes_to_its_half(place, last):
@@ -101,6 +101,12 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
                 yield Event(change.kind, last, change.told, change)
             if beyond is None or again:
                 yield change.kind
+                return
+            if not low <= beyond.value <= high:
+                edge = at_value(beyond, low if beyond.value < low else high)
+                if edge is not None and is_real(edge.orbit):
+                    yield edge
+                yield "range"
                 return
             passed.append(met)
             place, length = beyond, min(length, FIRST_STEP)
@@ -167,9 +173,8 @@ def _is_crossed(place: Place) -> bool:
 
 def _to_the_edge(place: Place, after: Place, low: float, high: float) -> Iterator[Place | Event]:
     edge = low if after.value < low else high
-    last = zero_between(place, after, lambda each: each.value - edge)
+    last = at_value(zero_between(place, after, lambda each: each.value - edge) or place, edge)
     if last is not None:
-        last = at_value(last, edge) or last
         yield from _between(place, last)
         yield last
 
@@ -185,9 +190,16 @@ def _between(place: Place, after: Place) -> Iterator[Event]:
         if found is None:
             # The equations are singular there.
             found = interpolated_zero(place, TESTS[kind], (0.0, distance(place, after)))
+        if found is not None and kind == "fold" and not _is_extreme(place, found, after):
+            continue
         message = "" if found is None else told(kind, found)
         if found is not None and message:
             yield Event(kind, found, message)
+
+
+def _is_extreme(place: Place, found: Place, after: Place) -> bool:
+    """Whether the parameter has turned back at a place between two."""
+    return (found.value - place.value) * (found.value - after.value) > 0.0
 
 
 def _turned(place: Place, after: Place) -> bool:

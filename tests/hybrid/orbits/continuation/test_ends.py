@@ -251,3 +251,112 @@ def test_a_doubled_orbit_begins_at_its_flip():
     assert last.kind == "grazing"
     assert "no orbit is found beyond" in last.message
     assert last.value == pytest.approx(grazing.value, rel=1e-9)
+
+
+@pytest.mark.parametrize("high", [2.9, 3.0])
+def test_the_way_on_where_some_states_come_to_rest(high):
+    """Two oscillators that collide: beyond the grazing only the driven one moves."""
+
+    def collide(t, x, p):
+        change = (1 + p.e) * (x.u - x.w) / (1 + p.m)
+        return {"u": x.u - p.m * change, "w": x.w + change}
+
+    system = HybridSystem(
+        state=("x", "u", "y", "w"),
+        parameters={"A": 1.0, "om": 1.3, "g": 0.3, "e": 0.7, "m": 0.5, "k": 2.0, "c": 0.1},
+        period=lambda p: 2 * np.pi / p.om,
+        modes=[
+            Mode(
+                "free",
+                lambda t, x, p: (
+                    x.u,
+                    p.A * np.cos(p.om * t) - x.x - p.c * x.u,
+                    x.w,
+                    (-p.k * x.y - p.c * x.w) / p.m,
+                ),
+            )
+        ],
+        transitions=[
+            Transition("free", "free", Guard(lambda t, x, p: x.x - x.y - p.g, +1), Reset(collide), name="hit")
+        ],
+    )
+    run = simulate(system, (0.0,) * 4, (0.0, 800 * np.pi / 1.3))
+    branch = continue_orbit(periodic_orbit(system, run.x[-1]), "om", (1.2, high))
+    assert branch.status.ok
+    assert branch.parameter[[0, -1]].tolist() == [1.2, high]
+    grazing = branch.bifurcations[-1]
+    assert grazing.kind == "grazing"
+    exact = brentq(lambda w: (1 - w**2) ** 2 + (0.1 * w) ** 2 - 1 / 0.3**2, 1.5, 3.0)
+    assert grazing.value == pytest.approx(exact, rel=1e-10)
+    assert branch.orbit(len(branch) - 1).transitions == ()
+
+
+def test_a_slow_passage_is_passed():
+    """A quadratic neuron with adaptation: its period grows long before the branch ends."""
+    neuron = HybridSystem(
+        state=("v", "a"),
+        parameters={"I": 1.0},
+        modes=[Mode("on", lambda t, x, p: (x.v**2 + p.I - x.a, (0.2 * x.v - x.a) / 10))],
+        transitions=[
+            Transition(
+                "on",
+                "on",
+                Guard(lambda t, x, p: x.v - 5, +1),
+                Reset(lambda t, x, p: {"v": 0.6, "a": x.a + 0.5}),
+                name="spike",
+            )
+        ],
+    )
+    run = simulate(neuron, (0.0, 0.0), (0.0, 400.0))
+    branch = continue_orbit(periodic_orbit(neuron, run.x[-1], period=2.0), "I", (0.005, 5.0))
+    assert branch.status.ok
+    assert branch.parameter[[0, -1]].tolist() == [0.005, 5.0]
+    spikes = simulate(neuron, branch.x0[0], (0.0, 600.0), parameters={"I": 0.005}).jumps.t
+    assert branch.period[0] == pytest.approx(np.diff(spikes)[-1], rel=1e-8)
+
+
+def test_the_period_of_the_forcing_is_exact():
+    """A sampled loop whose dead time grows: its period stays the float that is declared."""
+    loop = HybridSystem(
+        state=("y",),
+        held=("u", "next"),
+        parameters={"T": 0.4, "td": 0.15},
+        period=lambda p: p.T,
+        modes=[Mode("run", lambda t, x, p: (x.u - x.y,))],
+        transitions=[
+            Transition(
+                "run", "run", Every("T"), Reset(lambda t, x, p: {"next": 1.5 * (1 - x.y)}), name="sample"
+            ),
+            Transition(
+                "run", "run", Every("T", offset="td"), Reset(lambda t, x, p: {"u": x.next}), name="act"
+            ),
+        ],
+    )
+    branch = continue_orbit(periodic_orbit(loop, (0.6, 0.6, 0.6)), "td", (0.05, 0.35))
+    assert set(branch.period) == {0.4}
+    for i in (0, len(branch) - 1):
+        orbit = branch.orbit(i)
+        arc = orbit.arc()
+        np.testing.assert_allclose(arc.x[-1], arc.x[0], atol=1e-10)
+
+
+def test_a_point_is_no_orbit_beyond_a_grazing():
+    """A neuron with adaptation comes to rest where its spike loses its speed: there the branch ends."""
+    neuron = HybridSystem(
+        state=("v", "w"),
+        parameters={"b": 0.3, "I": 1.5},
+        modes=[Mode("on", lambda t, x, p: (p.I - x.v - x.w, (p.b * x.v - x.w) / 5))],
+        transitions=[
+            Transition(
+                "on",
+                "on",
+                Guard(lambda t, x, p: x.v - 1, +1),
+                Reset(lambda t, x, p: {"v": 0.0, "w": x.w + 0.1}),
+                name="spike",
+            )
+        ],
+    )
+    run = simulate(neuron, (0.0, 0.0), (0.0, 100.0))
+    branch = continue_orbit(periodic_orbit(neuron, run.x[-1], period=3.0), "b", (0.0, 1.0))
+    sizes = [np.ptp(branch.orbit(i).arc().x[:, 0]) for i in range(len(branch))]
+    np.testing.assert_array_less(0.5, sizes)
