@@ -43,6 +43,9 @@ SHARE_OF_A_STAY = 0.02
 # Distances from the orbit at a change at which the system itself is asked for its way, in their units.
 FARTHER = (1e-5, 1e-4, 1e-3, 1e-2)
 
+# An orbit that holds what another one holds is so many of these distances away at most.
+NEIGHBOURHOOD = 5.0
+
 TANGENT = ("top", "speed")
 # Events that meet; in the others a field is along a surface.
 AT_A_CORNER = ("when", "end", "begin", "stay")
@@ -288,10 +291,15 @@ def _onward(near: Place, at: Place, key: Key) -> Onward:
                 continue
             more = len(jumps[1]) >= len(jumps[0])
             known = Onward(None, jumps, first if more else near.orbit, stretch, True)
-            corrected = family.corrected(first.loop, first, first.units(near.sizes))
+            units = first.units(near.sizes)
+            if near.family.held is not None:
+                # Until it holds them, at the same parameter.
+                units[-len(near.sizes) :] = np.finfo(float).tiny
+            corrected = family.corrected(first.loop, first, units)
             if corrected is not None and near.family.held is not None:
                 orbit = holding(corrected[0], near.family.held, near.sizes)
-                corrected = orbit.family.corrected(orbit.loop, orbit, orbit.units(near.sizes))
+                units, reach = orbit.units(near.sizes), NEIGHBOURHOOD * farther
+                corrected = orbit.family.corrected(orbit.loop, orbit, units, reach=reach)
             if corrected is None:
                 continue
             onward = np.eye(len(corrected[0].loop.flat))[-len(near.sizes) :]

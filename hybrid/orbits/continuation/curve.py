@@ -41,6 +41,10 @@ UNBOUNDED = 2.0**26
 RESONANCES = {"1:4 resonance": 0.0, "1:3 resonance": -1.0}
 STRONG = {"1:1 resonance": 2.0, "1:2 resonance": -2.0}
 
+# The multiplier of a kind, and how near one is to it.
+AT = {"fold": 1.0, "flip": -1.0}
+MEETS = 1e-3
+
 
 @attrs.frozen(eq=False)
 class Spot:
@@ -262,9 +266,18 @@ def _between(curve: Curve, spot: Spot, after: Spot) -> list[Special]:
         found = _zero(curve, spot, after, function)
         if found is None:
             continue
-        if kind != "cusp" or np.linalg.norm(found.along[-2:]) < STANDS * np.linalg.norm(spot.along[-2:]):
+        if _is_proved(kind, spot, found):
             special.append(Special(kind, found, message))
     return sorted(special, key=lambda each: _ahead(spot, each.spot))
+
+
+def _is_proved(kind: str, spot: Spot, found: Spot) -> bool:
+    """Whether what a test function shows is there: near a touch multipliers have no bound."""
+    if kind == "cusp":
+        return bool(np.linalg.norm(found.along[-2:]) < STANDS * np.linalg.norm(spot.along[-2:]))
+    values = found.place.orbit.free_multipliers
+    wanted = [value for name, value in AT.items() if name in kind]
+    return all(np.abs(values - value).min() < MEETS for value in wanted)
 
 
 def _tests(kind: str, spot: Spot) -> Iterator[tuple[str, Callable[[Spot], float], str]]:
