@@ -315,6 +315,7 @@ def test_a_slow_passage_is_passed():
     assert branch.period[0] == pytest.approx(np.diff(spikes)[-1], rel=1e-8)
 
 
+@pytest.mark.as_given
 def test_the_period_of_the_forcing_is_exact():
     """A sampled loop whose dead time grows: its period stays the float that is declared."""
     loop = HybridSystem(
