@@ -105,16 +105,19 @@ class Pass:
     @cached_property
     def own_scale(self) -> np.ndarray:
         """Largest absolute values ``(n,)`` of the components along the orbit."""
-        shares = np.linspace(0.0, 1.0, LOOKED_AT)
-        states = [flow.at(shares) for flow in self.flows if flow.arc is not None]
-        return np.asarray(np.abs(np.concatenate([self.loop.x, *states])).max(axis=0))
+        return np.asarray(np.abs(self._states).max(axis=0))
 
-    @cached_property
+    @property
     def is_point(self) -> bool:
         """Whether nothing moves along it: an equilibrium of an autonomous system is no orbit."""
+        return not self.family.forced and bool(np.all(np.ptp(self._states, axis=0) <= NO_SIZE * self.scale))
+
+    @cached_property
+    def _states(self) -> np.ndarray:
+        """States ``(N, n)`` all along the orbit."""
         shares = np.linspace(0.0, 1.0, LOOKED_AT)
-        states = np.concatenate([self.loop.x, *(flow.at(shares) for flow in self.flows)])
-        return not self.family.forced and bool(np.all(np.ptp(states, axis=0) <= NO_SIZE * self.scale))
+        states = [flow.at(shares) for flow in self.flows if flow.arc is not None]
+        return np.concatenate([self.loop.x, *states])
 
     @property
     def period(self) -> float:

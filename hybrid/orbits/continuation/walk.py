@@ -72,8 +72,9 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
             # So near to another branch that it may be on that one: the step goes over the place.
             made = place.step(np.array([OVER * length])) or made
         after, corrections = made
-        change = None if is_real(after.orbit) else located(place, after)
-        if change is None and not is_real(after.orbit):
+        real = is_real(after.orbit)
+        change = None if real else located(place, after)
+        if change is None and not real:
             yield "lost"
             return
         last = after if change is None else change.place

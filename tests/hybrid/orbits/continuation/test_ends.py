@@ -291,27 +291,34 @@ def test_the_way_on_where_some_states_come_to_rest(high):
     assert branch.orbit(len(branch) - 1).transitions == ()
 
 
-def test_a_slow_passage_is_passed():
-    """A quadratic neuron with adaptation: its period grows long before the branch ends."""
-    neuron = HybridSystem(
-        state=("v", "a"),
-        parameters={"I": 1.0},
-        modes=[Mode("on", lambda t, x, p: (x.v**2 + p.I - x.a, (0.2 * x.v - x.a) / 10))],
+def neuron(parameters, field, peak, v, more):
+    """It fires at a peak of its voltage, which goes back to ``v``; its adaptation grows by so much."""
+    return HybridSystem(
+        state=("v", "w"),
+        parameters=parameters,
+        modes=[Mode("on", field)],
         transitions=[
             Transition(
                 "on",
                 "on",
-                Guard(lambda t, x, p: x.v - 5, +1),
-                Reset(lambda t, x, p: {"v": 0.6, "a": x.a + 0.5}),
+                Guard(lambda t, x, p: x.v - peak, +1),
+                Reset(lambda t, x, p: {"v": v, "w": x.w + more}),
                 name="spike",
             )
         ],
     )
-    run = simulate(neuron, (0.0, 0.0), (0.0, 400.0))
-    branch = continue_orbit(periodic_orbit(neuron, run.x[-1], period=2.0), "I", (0.005, 5.0))
+
+
+def test_a_slow_passage_is_passed():
+    """A quadratic neuron with adaptation: its period grows long before the branch ends."""
+    quadratic = neuron(
+        {"I": 1.0}, lambda t, x, p: (x.v**2 + p.I - x.w, (0.2 * x.v - x.w) / 10), peak=5.0, v=0.6, more=0.5
+    )
+    run = simulate(quadratic, (0.0, 0.0), (0.0, 400.0))
+    branch = continue_orbit(periodic_orbit(quadratic, run.x[-1], period=2.0), "I", (0.005, 5.0))
     assert branch.status.ok
     assert branch.parameter[[0, -1]].tolist() == [0.005, 5.0]
-    spikes = simulate(neuron, branch.x0[0], (0.0, 600.0), parameters={"I": 0.005}).jumps.t
+    spikes = simulate(quadratic, branch.x0[0], (0.0, 600.0), parameters={"I": 0.005}).jumps.t
     assert branch.period[0] == pytest.approx(np.diff(spikes)[-1], rel=1e-8)
 
 
@@ -343,21 +350,14 @@ def test_the_period_of_the_forcing_is_exact():
 
 def test_a_point_is_no_orbit_beyond_a_grazing():
     """A neuron with adaptation comes to rest where its spike loses its speed: there the branch ends."""
-    neuron = HybridSystem(
-        state=("v", "w"),
-        parameters={"b": 0.3, "I": 1.5},
-        modes=[Mode("on", lambda t, x, p: (p.I - x.v - x.w, (p.b * x.v - x.w) / 5))],
-        transitions=[
-            Transition(
-                "on",
-                "on",
-                Guard(lambda t, x, p: x.v - 1, +1),
-                Reset(lambda t, x, p: {"v": 0.0, "w": x.w + 0.1}),
-                name="spike",
-            )
-        ],
+    leaky = neuron(
+        {"b": 0.3, "I": 1.5},
+        lambda t, x, p: (p.I - x.v - x.w, (p.b * x.v - x.w) / 5),
+        peak=1.0,
+        v=0.0,
+        more=0.1,
     )
-    run = simulate(neuron, (0.0, 0.0), (0.0, 100.0))
-    branch = continue_orbit(periodic_orbit(neuron, run.x[-1], period=3.0), "b", (0.0, 1.0))
+    run = simulate(leaky, (0.0, 0.0), (0.0, 100.0))
+    branch = continue_orbit(periodic_orbit(leaky, run.x[-1], period=3.0), "b", (0.0, 1.0))
     sizes = [np.ptp(branch.orbit(i).arc().x[:, 0]) for i in range(len(branch))]
     np.testing.assert_array_less(0.5, sizes)
