@@ -22,7 +22,7 @@ from hybrid.compiler.bounds.program import programs
 from hybrid.compiler.bounds.residues import residue_of_guard, residues
 from hybrid.compiler.cases import body_text, cases_of_index, function_text
 from hybrid.compiler.curvature import curvature
-from hybrid.compiler.emitted import Emitted, Propagator
+from hybrid.compiler.emitted import NO_SERIES, Emitted, Propagator
 from hybrid.compiler.jacobians import (
     cells,
     gradient,
@@ -132,6 +132,8 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
     crossing, at_crossings = fields_at_crossings(system, fields, steep, guards, resets, boundaries, symbols)
     series = [each.series for each in propagators]
     places = places_of(series, with_room=system.growth is not None)
+    abreast = [each.abreast or NO_SERIES for each in propagators]
+    beside = places_of(abreast, with_room=system.growth is not None, whole=1)
     text = writer.text
     bodies: dict[str, list[str]] = {
         "field": [
@@ -152,6 +154,10 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
         "reset_jacobian": [text("slopes", each, partial(zeros_first, each.derivative, n)) for each in resets],
         "series": placed(places, [text("series", each, each.statements) for each in series]),
         "tangent_series": placed(places, [text("tangent", each, each.tangent_statements) for each in series]),
+        "series_abreast": placed(beside, [text("series", each, each.statements) for each in abreast]),
+        "tangent_series_abreast": placed(
+            beside, [text("tangent", each, each.tangent_statements) for each in abreast]
+        ),
     }
     surface, orientation = writer.surfaces(traced)
     pulses = [
@@ -222,13 +228,17 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
         ),
         propagators=tuple(map(_without_code, propagators)),
         tangent_start=places.vectors,
+        tangent_start_abreast=beside.vectors,
     )
 
 
 def _without_code(propagator: Propagator) -> Propagator:
     """The propagator without its statements, which are in the texts of the model."""
-    series = attrs.evolve(propagator.series, statements=(), tangent_statements=())
-    return attrs.evolve(propagator, series=series)
+    series, abreast = (
+        None if each is None else attrs.evolve(each, statements=(), tangent_statements=())
+        for each in (propagator.series, propagator.abreast)
+    )
+    return attrs.evolve(propagator, series=series, abreast=abreast)
 
 
 class _Writer:

@@ -62,6 +62,8 @@ class Propagator:
         Whether the series may be undefined where the field is defined, as that of a root at zero.
     root
         The order of the root of guards that the series hold.
+    abreast
+        The series for runs abreast; None if there is none.
     """
 
     kind: int
@@ -71,6 +73,7 @@ class Propagator:
     guards: tuple[bool, ...] = ()
     fragile: bool = False
     root: int = 1
+    abreast: Series | None = None
 
     def __str__(self) -> str:
         return f"{PROPAGATORS[self.kind]} ({self.reason})"
@@ -166,8 +169,8 @@ class Emitted:
         NO_MODE if the run ends.
     propagators
         By mode: how it is best advanced.
-    tangent_start
-        The first column of tangent vectors in series.
+    tangent_start, tangent_start_abreast
+        The first column of tangent vectors in series, and in those of runs abreast.
     tables
         The numbers of all tables, as text (``hybrid.compiler.tables``).
     opaque
@@ -200,6 +203,7 @@ class Emitted:
     crossing: tuple[tuple[int, int], ...]
     propagators: tuple[Propagator, ...]
     tangent_start: int
+    tangent_start_abreast: int
     tables: str = ""
     opaque: dict[str, OpaqueFunction] = attrs.field(factory=dict)
 

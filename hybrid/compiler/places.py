@@ -30,12 +30,15 @@ class Places:
     vectors: int
 
 
-def places_of(series: Sequence[Series], *, with_room: bool) -> Places:
-    """The columns of all series; ``with_room``, further modes seldom move those of the modes before them."""
+def places_of(series: Sequence[Series], *, with_room: bool, whole: int = WIDE) -> Places:
+    """The columns of all series; ``with_room``, further modes seldom move those of the modes before them.
+
+    Those of tangent vectors begin at a multiple of ``whole``.
+    """
     size = _power_of_two_from if with_room else int
     first = size(max(each.columns for each in series))
     tables = [*accumulate((each.table_columns for each in series), initial=first)]
-    return Places(tuple(tables[:-1]), padded(size(tables[-1]), WIDE))
+    return Places(tuple(tables[:-1]), padded(size(tables[-1]), whole))
 
 
 def _power_of_two_from(count: int) -> int:

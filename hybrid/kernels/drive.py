@@ -1,6 +1,7 @@
 """The driver: smooth steps, events, jumps, until a given time. All runs are calls of ``advance``."""
 
 import math
+from typing import NamedTuple
 
 from numba import njit
 
@@ -45,7 +46,7 @@ from hybrid.kernels.types.codes import (
 )
 from hybrid.kernels.types.kinds import INTEGER, REAL
 from hybrid.kernels.types.layout import EPSILON, Parts, Task
-from hybrid.kernels.types.options import KERNEL, exported
+from hybrid.kernels.types.options import INLINE, KERNEL, exported
 
 # More jumps than this at one instant, in total or per transition, count as endless.
 MOST_JUMPS_AT_ONCE = 1000
@@ -86,7 +87,7 @@ def fire(parts, task, stop_cycle, stop_phase, max_jumps):
         parts.late_jump(model, task.method, run, fired, task.work)
     if model.clock[fired] != 0:
         jump_at_tick(parts, task, fired)
-    else:
+    elif not parts.jump_plainly(task, fired):
         parts.jump(task, fired)
     begin_stretch(model, run, time_left(model, run, stop_cycle, stop_phase))
     if model.target[fired] == NO_MODE:
@@ -124,6 +125,10 @@ def enter(parts, task):
         return NON_FINITE
     if model.clocks.shape[0] > 0:
         wind(model, run)
+    if run.clear == 1:
+        take_clear_sides(model, run)
+        begin_stay(run, mode)
+        return GO_ON
     fires = parts.enter(model, run, task.work)
     if fires == RESTING or (fires == NO_TRANSITION and parts.rests_on_guard(task)):
         if model.accumulates_to[run.last_fired] == NO_MODE:
@@ -134,12 +139,28 @@ def enter(parts, task):
     if fires != NO_TRANSITION:
         run.pending = fires
         return GO_ON
+    begin_stay(run, mode)
+    return GO_ON
+
+
+@njit(**INLINE)
+def take_clear_sides(model, run):
+    """Take the sides of a mode that a plain jump has entered (``jumps.plain``)."""
+    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
+        other = model.outgoing[slot]
+        run.side[other], run.on_guard[other] = run.rehearsal[0, other], run.rehearsal[1, other]
+        run.due[other], run.rehearsal[3, other] = 0, 0
+    run.clear = 0
+
+
+@njit(**INLINE)
+def begin_stay(run, mode):
+    """Begin a stay in a mode whose sides have been taken."""
     if mode != run.previous_mode:
         run.next_step = run.first_step[mode]
         run.first_step[mode] = 0.0
     run.last_step = 0.0
     run.stage = STALE
-    return GO_ON
 
 
 @njit(**KERNEL)
@@ -322,13 +343,26 @@ def meet(task, clock, knot, at_knot):
         go_to_tick(task.model, task.run, clock)
 
 
-@exported(INTEGER, Parts, Task, INTEGER, REAL, INTEGER, INTEGER)
-def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
-    """Advance a run to the time ``stop_cycle`` periods and ``stop_phase``; returns a code.
+class Room(NamedTuple):
+    """How long the next step may be.
 
-    The run can be taken up again after ``RECORD_FULL`` once the record has been emptied, after ``MAX_STEPS``
-    and ``MAX_JUMPS`` with larger limits; after ``INCOMPLETE`` where this call began, with all parts.
+    So much time ``remains`` until the stop, ``until`` the tick of a ``clock`` if that is before, and so much
+    in ``all`` until the last moment before a ``knot``.
     """
+
+    remains: REAL
+    until: REAL
+    all: REAL
+    knot: REAL
+    clock: INTEGER
+
+
+NO_ROOM = Room(0.0, 0.0, 0.0, 0.0, NO_TRANSITION)
+
+
+@njit(**KERNEL)
+def prepare(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
+    """Bring a run to where it can take its next step: GO_ON and its room there, or why the run ends."""
     model, run = task.model, task.run
     if run.horizon == 0.0 and run.steps == 0:
         run.horizon = max(time_left(model, run, stop_cycle, stop_phase), 0.0)
@@ -336,12 +370,12 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         if run.pending != NO_TRANSITION:
             code = fire(parts, task, stop_cycle, stop_phase, max_jumps)
             if code != GO_ON:
-                return code
+                return code, NO_ROOM
             continue
         if run.stage == ENTERING:
             code = enter(parts, task)
             if code != GO_ON:
-                return code
+                return code, NO_ROOM
             continue
         remaining = time_left(model, run, stop_cycle, stop_phase)
         clock, tick, band = next_tick(model, run)
@@ -351,34 +385,61 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         if remaining <= 0.0:
             fired = parts.arrived(task)
             if fired == NO_TRANSITION:
-                return DONE
+                return DONE, NO_ROOM
             run.pending = parts.first_in_order(task, fired, stop_cycle, stop_phase)
             continue
         if is_full(task.record):
-            return RECORD_FULL
+            return RECORD_FULL, NO_ROOM
         if run.steps >= max_steps:
-            return MAX_STEPS
+            return MAX_STEPS, NO_ROOM
         # A tick that is as good as at the end is there.
         until = remaining if tick + band >= remaining else tick
         room, knot = room_before_knot(model, run, until)
         if not room > 0.0:
             pass_knot(task, knot)
             continue
-        code, span = step(parts, task, room)
+        return GO_ON, Room(remaining, until, room, knot, clock)
+
+
+@njit(**KERNEL)
+def complete(parts, task, room, span, stop_cycle, stop_phase, alone):
+    """Count the time of a step, which has moved the state; returns GO_ON, or why the run ends.
+
+    An event may be known to be ``alone``: then it is the one that fires.
+    """
+    model, run = task.model, task.run
+    if not gets_on(model, task.method, run, room.remains):
+        return STEP_TOO_SMALL
+    go_forward(model, run, span)
+    if model.timed[run.mode] == 1 and is_late(task.method, run):
+        parts.late_step(model, task.method, run, span, task.work)
+    if task.tangents > 0 and task.orthonormal != 0 and 0.0 < span < room.remains:
+        parts.keep_apart(model, run, run.mode, task.tangents, task.work.jacobian)
+    fired = run.pending
+    if span > room.remains or (span >= room.remains and fired == NO_TRANSITION):
+        set_clock(run, stop_cycle, stop_phase)
+    elif span >= room.all and (fired == NO_TRANSITION or room.all == room.until < room.remains):
+        # A crossing that rounding puts at the tick or behind it does not pass the tick.
+        meet(task, room.clock, room.knot, room.all < room.until)
+    if fired != NO_TRANSITION and not alone:
+        run.pending = parts.first_in_order(task, fired, stop_cycle, stop_phase)
+    return GO_ON
+
+
+@exported(INTEGER, Parts, Task, INTEGER, REAL, INTEGER, INTEGER)
+def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
+    """Advance a run to the time ``stop_cycle`` periods and ``stop_phase``; returns a code.
+
+    The run can be taken up again after ``RECORD_FULL`` once the record has been emptied, after ``MAX_STEPS``
+    and ``MAX_JUMPS`` with larger limits; after ``INCOMPLETE`` where this call began, with all parts.
+    """
+    while True:
+        code, room = prepare(parts, task, stop_cycle, stop_phase, max_steps, max_jumps)
+        if code != GO_ON:
+            return code
+        code, span = step(parts, task, room.all)
         if code != GO_ON:
             return int(code)
-        if not gets_on(model, task.method, run, remaining):
-            return STEP_TOO_SMALL
-        go_forward(model, run, span)
-        if model.timed[run.mode] == 1 and is_late(task.method, run):
-            parts.late_step(model, task.method, run, span, task.work)
-        if task.tangents > 0 and task.orthonormal != 0 and 0.0 < span < remaining:
-            parts.keep_apart(model, run, run.mode, task.tangents, task.work.jacobian)
-        fired = run.pending
-        if span > remaining or (span >= remaining and fired == NO_TRANSITION):
-            set_clock(run, stop_cycle, stop_phase)
-        elif span >= room and (fired == NO_TRANSITION or room == until < remaining):
-            # A crossing that rounding puts at the tick or behind it does not pass the tick.
-            meet(task, clock, knot, room < until)
-        if fired != NO_TRANSITION:
-            run.pending = parts.first_in_order(task, fired, stop_cycle, stop_phase)
+        code = complete(parts, task, room, span, stop_cycle, stop_phase, False)
+        if code != GO_ON:
+            return code

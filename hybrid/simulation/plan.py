@@ -225,6 +225,7 @@ def driver_parts(
         late_step=needed(timed, lambda: late().late_step),
         late_jump=needed(timed, lambda: late().late_jump),
         jump=jumps.jump,
+        jump_plainly=load_kernels("hybrid.kernels.jumps.plain").jump_plainly,
         finish_chatter=Absent(),
         complete=0,
         rest=jumps.rest,

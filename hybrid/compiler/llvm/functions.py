@@ -12,6 +12,7 @@ import numpy as np
 from hybrid.compiler.cache.folder import keep, source_key
 from hybrid.compiler.cache.store import kept_of_model, models_folder
 from hybrid.compiler.cases import Case, cases_in, function_text
+from hybrid.compiler.llvm.abreast import ABREAST_SIGNATURE, AbreastBody
 from hybrid.compiler.llvm.engine import load, processor
 from hybrid.compiler.llvm.lowering import (
     MATRIX_SIGNATURE,
@@ -40,10 +41,14 @@ SIGNATURES = {
     "reset_jacobian": MATRIX_SIGNATURE,
     "series": SERIES_SIGNATURE,
     "tangent_series": SERIES_SIGNATURE,
+    "series_abreast": ABREAST_SIGNATURE,
+    "tangent_series_abreast": ABREAST_SIGNATURE,
 }
 # In series, multiplications and additions may be fused. In a guard, fusing could make a difference of equal
 # terms nonzero.
-FUSED = ("series", "tangent_series")
+FUSED = ("series", "tangent_series", "series_abreast", "tangent_series_abreast")
+# What writes the instructions of these functions.
+BODIES = dict.fromkeys(("series_abreast", "tangent_series_abreast"), AbreastBody)
 
 
 def own_functions(emitted: Emitted) -> dict[str, tuple[Any, int]]:
@@ -118,7 +123,14 @@ def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction | C
     repeats = '["repeat",' in source
     kinds = {name: name.partition(CASE)[0] for name in names}
     wanted = [
-        Function(name, SIGNATURES.get(kind, VECTOR_SIGNATURE), cases[name], kind in FUSED, repeats)
+        Function(
+            name,
+            SIGNATURES.get(kind, VECTOR_SIGNATURE),
+            cases[name],
+            kind in FUSED,
+            repeats,
+            BODIES.get(kind),
+        )
         for name, kind in kinds.items()
     ]
     return machine_code(wanted, calls)

@@ -105,6 +105,8 @@ class Function:
         Whether multiplications and additions may be fused.
     repeats
         Whether some of its loops consist of turns that do not wait for one another.
+    body
+        What writes its instructions; ``Body`` for None.
     """
 
     name: str
@@ -112,6 +114,7 @@ class Function:
     cases: Sequence[Any]
     fused: bool = False
     repeats: bool = False
+    body: Any = None
 
 
 def lower(module: Any, written: Function, calls: Mapping[str, OwnFunction | CaseTable] = NO_CALLS) -> None:
@@ -125,10 +128,10 @@ def lower(module: Any, written: Function, calls: Mapping[str, OwnFunction | Case
     kinds = [ARRAYS.get(kind, kind) for kind in written.signature.types]
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), written.name)
     function.attributes.add("nounwind")
-    _Body(function, written, calls).write(written.cases)
+    (written.body or Body)(function, written, calls).write(written.cases)
 
 
-class _Body:
+class Body:
     """Writes the instructions of one function."""
 
     def __init__(
@@ -202,9 +205,12 @@ class _Body:
         elif kind == "at":
             name, *indices = parts
             array = self._local(name, value) if name in self.arrays else self.values[name]
-            self.builder.store(self.number(value), self._place(array, indices))
+            self._set_entry(array, indices, value)
         else:
             self._store_variable(parts[0], value)
+
+    def _set_entry(self, array: Any, indices: Sequence[Any], value: Any) -> None:
+        self.builder.store(self.number(value), self._place(array, indices))
 
     def _store_variable(self, name: str, value: Any) -> None:
         if name in self.values:
@@ -216,7 +222,7 @@ class _Body:
         if variable is None:
             variable = self.variables[name] = self.front.alloca(value.type, name=name)
         kept = variable.allocated_type
-        if kept == NUMBER:
+        if kept != WHOLE:
             value = self.number(value)
         if kept != value.type:
             raise LoweringError(f"{name} is {kept} in one place and {value.type} in another")

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+import attrs
+
 from hybrid.compiler.emitted import Propagator
+from hybrid.compiler.propagators.abreast import write_abreast
 from hybrid.compiler.propagators.affine import affine
 from hybrid.compiler.propagators.desingularised import desingularised
 from hybrid.compiler.propagators.equations import Boundary, Equations, equations_of
@@ -33,7 +36,7 @@ def propagator(
         for strategy in STRATEGIES:
             found = strategy(mode)
             if isinstance(found, Propagator):
-                return found
+                return attrs.evolve(found, abreast=write_abreast(field, boundaries, symbols, found))
             reason = found
     except NoSeries as refusal:
         reason = str(refusal)

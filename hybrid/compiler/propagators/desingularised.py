@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from hybrid.compiler.emitted import Propagator, Series
 from hybrid.compiler.propagators.equations import Boundary, Equations, in_terms_of_root
@@ -28,19 +28,20 @@ def desingularised(mode: Equations) -> Propagator | str:
     if order > 2 and not is_crossed(mode.field, z, order, mode.symbols):
         # On the clock the root would fall exponentially, and never reach zero.
         raise NoSeries("it has fractional powers of a guard whose rate may vanish with the guard")
-    written = _write_desingularised(mode.field, mode.boundaries, mode.guards, z, order, mode.symbols)
+    written = write_desingularised(mode.field, mode.boundaries, mode.guards, z, order, mode.symbols)
     powers, clock = ("half-integer powers", "w") if order == 2 else ("fractional powers", f"w^{order - 1}")
     reason = f"{powers} of a guard, on the clock dt = {clock} ds"
     return Propagator(DESINGULARISED, 0, reason, written, tuple(mode.held), root=order)
 
 
-def _write_desingularised(
+def write_desingularised(
     field: Sequence[Expression],
     boundaries: Sequence[Boundary],
     guards: Sequence[Expression],
     z: Expression,
     order: int,
     symbols: Symbols,
+    body_of: Callable[..., Body] = Body,
 ) -> Series:
     """Series on the clock ``dt = w**(q-1) ds``, ``z = w**q``, where powers of ``z`` are powers of ``w``.
 
@@ -54,7 +55,7 @@ def _write_desingularised(
     harmonics = harmonics_of(field, symbols)
     field = all_replaced(field, harmonics)
     # The time since the start is advanced too, in the column after the states.
-    body = Body(
+    body = body_of(
         symbols, guards, [ROOT, *harmonics.values()], lambda prefix: get(f"{prefix}y{len(symbols.x)}")
     )
     clock, (root, *driven) = body.column(CLOCK), body.rows.values()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from hybrid.compiler.emitted import Propagator, Series
 from hybrid.compiler.propagators.equations import Boundary, Equations, in_terms_of_root
@@ -18,14 +18,10 @@ from hybrid.kernels.types.codes import ROOTED
 
 def rooted(mode: Equations) -> Propagator | str:
     """Series in time of the state and of those roots of guards that are smooth in time."""
-    candidates = (
-        regular_root(mode.field, z, order, place, mode.symbols)
-        for place, (z, order) in enumerate(mode.bases.items())
-    )
-    roots = [root for root in candidates if root is not None]
+    roots = regular_roots(mode)
     if not roots:
         return "no root of a guard in it is smooth in time"
-    written = _write_rooted(mode.field, mode.boundaries, mode.guards, roots, mode.symbols)
+    written = write_rooted(mode.field, mode.boundaries, mode.guards, roots, mode.symbols)
     powers = "half-integer" if all(root.order == 2 for root in roots) else "fractional"
     reason = f"{powers} powers of a guard, whose root is smooth"
     largest = max(root.order for root in roots)
@@ -34,15 +30,25 @@ def rooted(mode: Equations) -> Propagator | str:
     return Propagator(ROOTED, 0, reason, written, tuple(mode.held), fragile=fragile, root=largest)
 
 
-def _write_rooted(
+def regular_roots(mode: Equations) -> list[Root]:
+    """The roots of guards that are smooth in time."""
+    candidates = (
+        regular_root(mode.field, z, order, place, mode.symbols)
+        for place, (z, order) in enumerate(mode.bases.items())
+    )
+    return [root for root in candidates if root is not None]
+
+
+def write_rooted(
     field: Sequence[Expression],
     boundaries: Sequence[Boundary],
     guards: Sequence[Expression],
     roots: Sequence[Root],
     symbols: Symbols,
+    body_of: Callable[..., Body] = Body,
 ) -> Series:
     """Series in time of the states and of the roots; powers of the roots replace fractional powers."""
-    body = Body(symbols, guards, [root.symbol for root in roots], lambda _: ONE_THEN_ZERO)
+    body = body_of(symbols, guards, [root.symbol for root in roots], lambda _: ONE_THEN_ZERO)
     seeds = seeds_of(symbols)
 
     def in_all_roots(expression: Expression) -> Expression:

@@ -43,9 +43,14 @@ FLOOR = 1e-17
 SAME_ROOT = 1e-13
 
 
-def write_series(field: Sequence[Expression], guards: Sequence[Expression], symbols: Symbols) -> Series:
+def write_series(
+    field: Sequence[Expression],
+    guards: Sequence[Expression],
+    symbols: Symbols,
+    body_of: Callable[..., Body] | None = None,
+) -> Series:
     """The series of a field in time, without and with tangent vectors."""
-    body = Body(symbols, guards, (), lambda _: ONE_THEN_ZERO)
+    body = (body_of or Body)(symbols, guards, (), lambda _: ONE_THEN_ZERO)
     seeds = seeds_of(symbols)
     tangents = directional(field, seeds)
     trace = divergence(field, symbols.x)
@@ -102,11 +107,15 @@ class Body:
         self.symbols, self.time = symbols, time
         self.n = len(symbols.x)
         self.behind_guards = self.n + len(guards)
-        self.columns = padded(self.behind_guards + OTHERS, WIDE)
+        self.columns = self.first_columns()
         self.rows = {symbol: self.allot() for symbol in others}
         self.constants = Constants()
         self.preamble: list[Statement] = []
         self.at_start: dict[Expression, Any] = {}
+
+    def first_columns(self) -> int:
+        """How many columns come first, in whole vectors."""
+        return padded(self.behind_guards + OTHERS, WIDE)
 
     def column(self, place: int) -> int:
         """A column after those of the guards."""
@@ -180,14 +189,14 @@ class Body:
         together = [*moved.higher(), *carried.higher()]
         shared = [*self.preamble, *self.constants.statements(), put(o, 0)]
         return Series(
-            (*_named(places), *shared, *alone.first(), _each_order(alone.higher())),
+            (*named(places), *shared, *alone.first(), each_order(alone.higher())),
             (
-                *_named(placed),
+                *named(placed),
                 groups(self.n),
                 *shared,
                 *moved.first(),
                 *carried.first(),
-                _each_order(together),
+                each_order(together),
             ),
             padded(max(width, self.columns), WIDE),
             0,
@@ -204,16 +213,20 @@ class Body:
         guards: Sequence[Expression],
     ) -> StateLoop:
         """The loop of the state and of all other quantities in ``rates``; local names have a prefix."""
-        state = {x: i for i, x in enumerate(self.symbols.x)}
-        time = self.symbols.t, self.time(prefix)
-        block = Recurrences(
-            {**state, **self.rows}, time, self.allot, prefix, self.constants, at_start=self.at_start
-        )
+        block = self._block(prefix)
         block.expect(names, rates)
         moved = StateLoop(names, columns, rates, starts, block)
         crossing = {self.n + place: block.coefficient(guard) for place, guard in enumerate(guards)}
         moved.write_front(self.behind_guards + OTHERS, crossing)
         return moved
+
+    def _block(self, prefix: str) -> Recurrences:
+        """The recurrences of the state and of what has columns besides; local names have a prefix."""
+        state = {x: i for i, x in enumerate(self.symbols.x)}
+        time = self.symbols.t, self.time(prefix)
+        return Recurrences(
+            {**state, **self.rows}, time, self.allot, prefix, self.constants, at_start=self.at_start
+        )
 
     def _place_pairs(self, loop: StateLoop) -> dict[str, int]:
         """Columns for the factors of convolutions; returns those of each block, and of each second factor."""
@@ -240,9 +253,11 @@ def groups(n: int) -> Statement:
     return put(GROUPS, (call("length", "x") // n + (NARROW - 2)) // NARROW)
 
 
-def _named(places: Mapping[str, int]) -> list[Statement]:
+def named(places: Mapping[str, int]) -> list[Statement]:
+    """Names for columns."""
     return [whole(name, place) for name, place in places.items()]
 
 
-def _each_order(statements: Sequence[Statement]) -> Statement:
+def each_order(statements: Sequence[Statement]) -> Statement:
+    """The loop over all orders above zero."""
     return loop("o", 1, ORDER + 1, [put(get("shrink"), 1.0 / o), *statements])

@@ -61,6 +61,8 @@ HIGHEST_ORDER = 32
 # Columns of series that are worked on at once, and in the widest register.
 NARROW = 4
 WIDE = 2 * NARROW
+# Runs that take a step together.
+ABREAST = 8
 
 # Propagators of a mode, and how people read them.
 RUNGE_KUTTA = 0

@@ -251,6 +251,7 @@ COUNTERS = (
     "entry_cycle",
     "turned",
     "turned_to",
+    "clear",
 )
 NUMBERS = (
     "phase",
@@ -303,6 +304,8 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
       clocks, those of a transition from ``model.first_tick`` on: period and offset, or times, or a duration.
       The mode was entered in the period ``entry_cycle`` at ``entry_phase``, and ``entry_low`` of rounding.
     - ``turned``: jumps at ticks that changed which transition of their clock may fire, last to ``turned_to``.
+    - ``clear``: 1 if the last jump has left the state clear of all guards but its own, with the sides of all in
+      ``rehearsal``: first the side of each, then whether it is zero.
     - ``horizon``: how long the run takes, as far as it is known at its start; 0 if it is not.
     - ``longest_step``: the longest step in time so far; ``lateness``: the largest change that the rounding of
       the time made in a step or jump, in tolerances.
@@ -490,6 +493,7 @@ class Parts(Structure):
     late_step: function(None, Model, Method, Run, REAL, Work)
     late_jump: function(None, Model, Method, Run, INTEGER, Work)
     jump: function(None, Task, INTEGER)
+    jump_plainly: function(TRUTH, Task, INTEGER)
     finish_chatter: function(TRUTH, Task, INTEGER, REAL)
     complete: INTEGER
     rest: function(None, Task)

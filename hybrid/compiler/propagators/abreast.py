@@ -1,0 +1,318 @@
+"""The series of a mode for runs abreast: every number in them is one number of each run.
+
+What makes a series of one run fast is how its columns lie side by side. Here each column fills a register by
+itself, so a column needs no place among others, and the recurrences are written plainly. An affine mode has
+no table here: that would be one of each run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from hybrid.compiler.emitted import Propagator, Series
+from hybrid.compiler.propagators.desingularised import write_desingularised
+from hybrid.compiler.propagators.equations import Boundary, Equations, equations_of
+from hybrid.compiler.propagators.rooted import regular_roots, write_rooted
+from hybrid.compiler.propagators.writing import (
+    OTHERS,
+    Body,
+    each_order,
+    harmonics_of,
+    named,
+    names_of_state,
+    seeds_of,
+    write_series,
+)
+from hybrid.compiler.statements.code import Statement, at, call, get, loop, put, several
+from hybrid.compiler.statements.values import assignments
+from hybrid.compiler.taylor.loops import GROUPS, ORDER, VECTORS, StateLoop, TangentLoop, below_highest
+from hybrid.compiler.taylor.series import OUT, ONE_THEN_ZERO, NoSeries, Recurrences, o
+from hybrid.expression.derivatives import derivative, directional, divergence
+from hybrid.expression.graph import all_replaced, is_negative, is_whole, replaced
+from hybrid.expression.nodes import ZERO, Expression, Symbol, add, multiply
+from hybrid.expression.operations import Absolute
+from hybrid.expression.tabulated import tables_of_time
+from hybrid.expression.tracing import Symbols
+from hybrid.kernels.types.codes import DESINGULARISED, EXACT, ROOTED, RUNGE_KUTTA
+
+# Rows below those of a series: the values at the end, what they are sums of, and a row for each guard.
+ROWS_OF_END = 2
+
+
+def write_abreast(
+    field: Sequence[Expression] | None,
+    boundaries: Sequence[Boundary],
+    symbols: Symbols,
+    found: Propagator,
+) -> Series | None:
+    """The series of a mode with the propagator ``found`` for runs abreast; None if it has none.
+
+    All its guards are columns. In the row of a guard, behind the ends, are the magnitudes of its gradient in
+    state and time, and what its value is a sum of.
+    """
+    guards = [boundary.guard for boundary in boundaries if boundary.guard is not None]
+    traced = field is not None and len(guards) == len(boundaries)
+    if not traced or found.kind == RUNGE_KUTTA or tables_of_time(*field, *guards):
+        return None
+    if found.degree > 0 and not all(found.guards):
+        # Of such a guard the polynomials of the state tell no end.
+        return None
+    try:
+        return _written(equations_of(field, boundaries, symbols), guards, found.kind)
+    except (NoSeries, RecursionError):
+        return None
+
+
+def _written(mode: Equations, guards: Sequence[Expression], kind: int) -> Series:
+    around, symbols = mode.boundaries, mode.symbols
+
+    def body(*arguments: Any) -> Body:
+        return AbreastBody(guards, *arguments)
+
+    if kind == DESINGULARISED:
+        [(z, order)] = mode.bases.items()
+        return write_desingularised(mode.field, around, guards, z, order, symbols, body)
+    if kind == ROOTED:
+        return write_rooted(mode.field, around, guards, regular_roots(mode), symbols, body)
+    if kind == EXACT:
+        return _with_forcing(mode.field, guards, symbols, body)
+    return write_series(mode.field, guards, symbols, body)
+
+
+def _with_forcing(
+    field: Sequence[Expression], guards: Sequence[Expression], symbols: Symbols, body_of: Any
+) -> Series:
+    """The series of a field whose sines and exponentials of time are states."""
+    driving = harmonics_of([*field, *guards], symbols)
+    body = body_of(symbols, guards, [*driving.values()], lambda _: ONE_THEN_ZERO)
+    seeds, trace = seeds_of(symbols), divergence(field, symbols.x)
+    begun = [get(f"start{i}") for i in range(len(driving))]
+    body.preamble += assignments(begun, list(driving))
+    columns, starts = names_of_state(symbols)
+    moved = all_replaced(field, driving)
+    turning = [replaced(derivative(function, symbols.t), driving) for function in driving]
+    return body.assemble(
+        [*symbols.x, *driving.values()],
+        [*columns, *body.rows.values()],
+        [*starts, *begun],
+        [*moved, *turning],
+        all_replaced(guards, driving),
+        trace,
+        directional(moved, seeds),
+        seeds,
+    )
+
+
+class AbreastBody(Body):
+    """The body of a mode for runs abreast; ``watched`` are the guards as functions of time and state."""
+
+    def __init__(self, watched: Sequence[Expression], symbols: Symbols, *others: Any) -> None:
+        self.watched = watched
+        super().__init__(symbols, *others)
+
+    def first_columns(self) -> int:
+        """How many columns come first."""
+        return self.behind_guards + OTHERS
+
+    def assemble(
+        self,
+        names: Sequence[Symbol | None],
+        columns: list[int],
+        starts: list[Any],
+        rates: Sequence[Expression],
+        guards: Sequence[Expression],
+        trace: Expression,
+        tangents: Sequence[Expression],
+        seeds: dict[Symbol, Symbol],
+    ) -> Series:
+        """As ``Body.assemble``."""
+        free = self.columns
+        alone = self._loop("s", names, columns, starts, rates, guards)
+        places = self._columns_of_pairs(alone)
+        width, self.columns = self.columns, free
+        columns, starts = [*columns, self.column(1)], [*starts, 0.0]
+        moved = self._loop("a", [*names, None], columns, starts, [*rates, trace], guards)
+        vectors = AbreastRecurrences(
+            dict.fromkeys(seeds.values(), 0), None, self.allot, "b", self.constants, moved.block, lanes=True
+        )
+        vectors.expect(seeds.values(), tangents)
+        carried = AbreastTangents(list(seeds.values()), vectors)
+        carried.compute(tangents)
+        placed = self._columns_of_pairs(moved) | carried.places()
+        shared = [*self.preamble, *self.constants.statements(), *self._sizes_of_guards(), put(o, 0)]
+        counted = put(GROUPS, call("length", "x") // self.n - 1)
+        return Series(
+            (*named(places), *shared, *alone.first(), each_order(alone.higher())),
+            (
+                *named(placed),
+                counted,
+                *shared,
+                *moved.first(),
+                *carried.first(),
+                each_order([*moved.higher(), *carried.higher()]),
+            ),
+            max(width, self.columns),
+            0,
+            carried.columns,
+        )
+
+    def _loop(
+        self,
+        prefix: str,
+        names: Sequence[Symbol | None],
+        columns: list[int],
+        starts: list[Any],
+        rates: Sequence[Expression],
+        guards: Sequence[Expression],
+    ) -> AbreastLoop:
+        block = self._block(prefix)
+        block.expect(names, rates)
+        moved = AbreastLoop(names, columns, rates, starts, block)
+        moved.others = {self.n + place: block.coefficient(guard) for place, guard in enumerate(guards)}
+        return moved
+
+    def _columns_of_pairs(self, moved: AbreastLoop) -> dict[str, int]:
+        """The column of the second factor of each convolution, by name; it has a new one if it has none."""
+        block, places = moved.block, dict[str, int]()
+        for place, (_, right) in enumerate(block.pairs):
+            known = block.rows.get(right)
+            if not isinstance(known, int):
+                known = self.allot()
+                moved.factors[place] = known
+            places[f"{block.prefix}c{place}"] = known
+        return places
+
+    def _sizes_of_guards(self) -> list[Statement]:
+        """Statements for the row of each guard."""
+        found, variables = list[Statement](), [*self.symbols.x, self.symbols.t]
+        for place, guard in enumerate(self.watched):
+            sizes = [Absolute(derivative(guard, each)) for each in variables]
+            sizes.append(magnitude(guard, variables))
+            row = ORDER + (ROWS_OF_END + 1 + place)
+            found += assignments([at("out", row, i) for i in range(len(sizes))], sizes)
+        return found
+
+
+def magnitude(expression: Expression, variables: Sequence[Symbol]) -> Expression:
+    """What a value is a sum of: rounding is a share of this, even where the sum cancels."""
+    if expression.is_sum:
+        return add(*(magnitude(term, variables) for term in expression.args))
+    if expression.is_product:
+        return multiply(*(magnitude(factor, variables) for factor in expression.args))
+    if expression.is_power and is_whole(expression.exponent) and not is_negative(expression.exponent):
+        return magnitude(expression.base, variables) ** expression.exponent
+    if not expression.args:
+        return Absolute(expression)
+    moved = (Absolute(derivative(expression, each)) * Absolute(each) for each in variables)
+    return add(Absolute(expression), *moved)
+
+
+class AbreastRecurrences(Recurrences):
+    """The recurrences of one tangent vector of each run."""
+
+    def at(self, order: Any, column: Any) -> Any:
+        """An entry of a column."""
+        return at("out", order, column)
+
+    def put(self, column: Any, value: Any) -> Statement:
+        """Statement that writes an entry of order ``o``."""
+        return put(at("out", o, column), value)
+
+    def beside(self, *place: int) -> Any:
+        """The column of a factor in a block."""
+        return get("v") + get(f"{self.prefix}b{place[0]}") + place[1]
+
+
+class AbreastLoop(StateLoop):
+    """The loop of the state.
+
+    Attributes
+    ----------
+    others
+        Coefficients by column, besides those of ``y``: the guards.
+    factors
+        By number of a convolution: the column of its second factor, for those that have none else.
+    """
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.others: dict[int, Any] = {}
+        self.factors: dict[int, int] = {}
+
+    def first(self) -> list[Statement]:
+        """Statements for order zero."""
+        begin = [put(name, start) for name, start in zip(self.names.values(), self.starts, strict=True)]
+        return [*begin, *self._state(), *self.block.first, *self._stored(), *self._rates()]
+
+    def higher(self) -> list[Statement]:
+        """Statements for order ``o``; ``shrink`` is 1/o."""
+        block = self.block
+        step = [put(name, get("shrink") * self._rate(i)) for i, name in enumerate(self.names.values())]
+        lefts = [left for left, _ in block.pairs]
+        rights = [block.beside(i) for i in range(len(lefts))]
+        inner = [block.inner(i) for i in range(len(lefts))]
+        return [*products(inner, lefts, rights), *step, *self._state(), *block.higher, *self._stored(), *self._rates()]
+
+    def _state(self) -> list[Statement]:
+        return [put(at("out", o, target), name) for target, name in self.names.items()]
+
+    def _stored(self) -> list[Statement]:
+        values = list(self.block.pairs.values())
+        columns = self.others | {column: values[place] for place, column in self.factors.items()}
+        return [put(at("out", o, column), value) for column, value in columns.items()]
+
+
+class AbreastTangents(TangentLoop):
+    """The loop over the tangent vectors of each run."""
+
+    def __init__(self, seeds: Sequence[Symbol], block: Recurrences) -> None:
+        super().__init__(seeds, block)
+        block.rows |= {seed: get("v") + i for i, seed in enumerate(seeds)}
+
+    @property
+    def columns(self) -> int:
+        """Number of columns that a tangent vector needs."""
+        return self.components + sum(map(len, self.block.blocks.values()))
+
+    def first(self) -> list[Statement]:
+        """Statements for order zero, and for order one of the vectors themselves."""
+        begun = [
+            put(at("out", 0, get("v") + i), at("x", (get("g") + 1) * self.components + i))
+            for i in range(self.components)
+        ]
+        later = [self._later(1, i, value) for i, value in enumerate(self.values)]
+        return self._each([*begun, *self.block.first, *later])
+
+    def higher(self) -> list[Statement]:
+        """Statements for order ``o``, and for order ``o + 1`` of the vectors themselves."""
+        block, names, lefts, rights = self.block, list[Any](), list[Any](), list[Any]()
+        for i, (left, factors) in enumerate(block.blocks.items()):
+            for place in range(len(factors)):
+                names.append(block.inner(i, place))
+                lefts.append(left)
+                rights.append(block.beside(i, place))
+        later = [self._later(o + 1, i, get("later") * value) for i, value in enumerate(self.values)]
+        statements = self._each([*products(names, lefts, rights), *block.higher, *later])
+        return below_highest([put(get("later"), 1.0 / (o + 1)), *statements])
+
+    def _later(self, order: Any, place: int, value: Any) -> Statement:
+        return put(at("out", order, get("v") + place), value)
+
+    def _each(self, statements: Any) -> list[Statement]:
+        return [loop("g", 0, GROUPS, [put(get("v"), VECTORS + get("g") * self.columns), *statements])]
+
+    def places(self) -> dict[str, int]:
+        """By name: where the operands of products with a common factor begin, counted from ``v``."""
+        found, place = {}, self.components
+        for i, rights in enumerate(self.block.blocks.values()):
+            found[f"{self.block.prefix}b{i}"] = place
+            place += len(rights)
+        return found
+
+
+def products(names: Sequence[Any], lefts: Sequence[Any], rights: Sequence[Any]) -> list[Statement]:
+    """The statement for the sums of products of two columns without both ends, if there are any."""
+    if not names:
+        return []
+    return [put(several(names), call("sums_of_products", OUT, o, several(lefts), several(rights)))]

@@ -1,0 +1,1 @@
+"""Steps of several runs at once: each number of a kernel here is a register with one number of each run."""
