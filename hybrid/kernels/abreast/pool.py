@@ -4,44 +4,30 @@ import math
 
 from numba import njit
 
+from hybrid.kernels.abreast.lanes import ROOM, STEPS, come_aboard, holds_roots, leave, order_of, places_in
 from hybrid.kernels.abreast.rows import bits_of, mask_of
 from hybrid.kernels.abreast.step import step_abreast
-from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.drive import Room, complete, keep_scale, prepare, remember_scale
 from hybrid.kernels.events.guards import has_program
 from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.guards.touch import forget_touches
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT
 from hybrid.kernels.steps.field.late import is_late
-from hybrid.kernels.steps.series import FINEST, as_far_as_last_time, land
+from hybrid.kernels.steps.series import land
 from hybrid.kernels.types.abreast import Abreast, Crew
 from hybrid.kernels.types.codes import (
     ABREAST,
     DESINGULARISED,
-    EXACT,
-    FROM_LAST_STEP,
-    FROM_STATE,
-    FROM_ZERO,
     GO_ON,
-    HIGHEST_ORDER,
     MAX_STEPS,
     NO_TRANSITION,
     READY,
-    ROOTED,
     RUNGE_KUTTA,
 )
 from hybrid.kernels.types.kinds import INTEGER
 from hybrid.kernels.types.layout import ADVANCE, Parts, Path, Task
 from hybrid.kernels.types.numba_door.addressed import task_at
 from hybrid.kernels.types.options import INLINE, KERNEL, exported
-
-
-@njit(**INLINE)
-def order_of(model, method, mode):
-    """The order of the series of a mode."""
-    if model.degree[mode] > 0:
-        return model.degree[mode]
-    return HIGHEST_ORDER if model.propagator[mode] == EXACT else method.order
 
 
 @njit(**KERNEL)
@@ -57,32 +43,6 @@ def is_plain(model, method, run, sea):
         if run.side[transition] == 0 or run.on_guard[transition] > BY_SPEED:
             return False
     return True
-
-
-@njit(**KERNEL)
-def take_aboard(sea, task, room, row):
-    """Write where a run is into its lane of the step."""
-    model, run, method, series = task.model, task.run, task.method, task.work.series
-    n, mode, order = model.dimension, run.mode, order_of(model, method, run.mode)
-    sea.t[row] = run.phase
-    for i in range(n * (1 + task.tangents)):
-        sea.x[i * ABREAST + row] = run.y[i]
-    for i in range(sea.p.shape[0] // ABREAST):
-        sea.p[i * ABREAST + row] = model.parameters[i]
-    sea.limits[row] = room
-    sea.limits[ABREAST + row] = min(method.max_step, as_far_as_last_time(model, run, mode))
-    sea.limits[2 * ABREAST + row] = FINEST * measured_time(model, run, mode)
-    first = model.first_outgoing[mode]
-    rooted = model.propagator[mode] == DESINGULARISED or model.propagator[mode] == ROOTED
-    for slot in range(first, model.first_outgoing[mode + 1]):
-        transition, g = model.outgoing[slot], slot - first
-        known = run.on_guard[transition] == BY_SPEED
-        sea.sides[0, g * ABREAST + row] = run.side[transition]
-        sea.sides[1, g * ABREAST + row] = 1.0 if known else 0.0
-        if rooted:
-            origin = FROM_LAST_STEP if run.stage == READY else FROM_STATE
-            sea.powers[order + 1, (n + g) * ABREAST + row] = series[order + 1, n + g]
-            sea.powers[order + 2, (n + g) * ABREAST + row] = FROM_ZERO if known else origin
 
 
 @njit(**KERNEL)
@@ -110,7 +70,7 @@ def take_ashore(sea, task, row):
         run.on_guard[transition] = 0
         run.rehearsal[3, transition] = run.side[transition] if transition == fired else 0
         run.passed[transition] = NO_ROOT
-        if model.propagator[mode] == DESINGULARISED or model.propagator[mode] == ROOTED:
+        if holds_roots(model, mode):
             work.series[order + 1, column] = powers[order + 1, column * ABREAST + row]
     run.stage = READY
     if fired != NO_TRANSITION:
@@ -162,44 +122,90 @@ def muster(advance, parts, sea, crew, r, max_steps, max_jumps):
             return
 
 
+@njit(**KERNEL)
+def fill(sea, crew, mode):
+    """Let runs that wait for a mode into its empty lanes; returns the bits of the lanes that are taken."""
+    bits, waiting = 0, crew.counts[mode]
+    for row in range(ABREAST):
+        if crew.aboard[mode, row] < 0 and waiting > 0:
+            waiting -= 1
+            r = crew.waiting[mode, waiting]
+            crew.aboard[mode, row] = r
+            task = task_at(crew.tasks[r])
+            places = places_in(task.model, task.tangents, crew.parameters, mode)
+            come_aboard(sea.lanes[mode], places, task, crew.rooms[r, 2], row)
+        if crew.aboard[mode, row] >= 0:
+            bits |= 1 << row
+    crew.counts[mode] = waiting
+    return bits
+
+
+@njit(**KERNEL)
+def fullest(crew):
+    """The mode that has most runs, aboard or waiting; -1 if there are none."""
+    found, most = -1, 0
+    for mode in range(crew.counts.shape[0]):
+        count = crew.counts[mode]
+        for row in range(ABREAST):
+            count += 1 if crew.aboard[mode, row] >= 0 else 0
+        if count > most:
+            found, most = mode, count
+    return found
+
+
+@njit(**KERNEL)
+def go_ashore(parts, sea, crew, mode, row, took):
+    """Let a run leave its lane: at the end of a step that it took, or where it was at the start."""
+    r = crew.aboard[mode, row]
+    crew.aboard[mode, row] = -1
+    task = task_at(crew.tasks[r])
+    places = places_in(task.model, task.tangents, crew.parameters, mode)
+    lane = sea.lanes[mode]
+    remains = lane[(places.numbers + ROOM) * ABREAST + row]
+    passed = crew.rooms[r, 2] - remains
+    leave(lane, places, task, row)
+    room = Room(
+        crew.rooms[r, 0] - passed, crew.rooms[r, 1] - passed, remains, crew.rooms[r, 3], crew.clocks[r]
+    )
+    if not took:
+        return r, GO_ON
+    fired = sea.fired[row]
+    alone = fired != NO_TRANSITION and is_alone(task.model, mode, fired)
+    span = take_ashore(sea, task, row)
+    return r, complete(parts, task, room, span, crew.cycles[r], crew.phases[r], alone)
+
+
 @exported(None, ADVANCE, Parts, Abreast, Crew, INTEGER, INTEGER)
 def advance_abreast(advance, parts, sea, crew, max_steps, max_jumps):
     """Advance the runs of a crew, each to its own time; ``crew.state`` gets their codes."""
     for r in range(crew.tasks.shape[0]):
         muster(advance, parts, sea, crew, r, max_steps, max_jumps)
-    modes = crew.counts.shape[0]
+    first = task_at(crew.tasks[0])
+    model, method, tangents = first.model, first.method, first.tangents
     while True:
-        mode = 0
-        for m in range(1, modes):
-            if crew.counts[m] > crew.counts[mode]:
-                mode = m
-        count = min(crew.counts[mode], ABREAST)
-        if count == 0:
+        mode = fullest(crew)
+        if mode < 0:
             return
-        crew.counts[mode] -= count
-        aboard = crew.waiting[mode, crew.counts[mode] : crew.counts[mode] + count]
-        for lane in range(count):
-            r = aboard[lane]
-            take_aboard(sea, task_at(crew.tasks[r]), crew.rooms[r, 2], lane)
-            crew.lanes[lane] = r
-        first = task_at(crew.tasks[crew.lanes[0]])
-        for lane in range(count, ABREAST):
-            take_aboard(sea, first, crew.rooms[crew.lanes[0], 2], lane)
-        asked = mask_of((1 << count) - 1)
-        done = bits_of(step_abreast(first.model, first.method, sea, mode, first.tangents, asked))
-        crew.steps += count
-        for lane in range(count):
-            r = crew.lanes[lane]
-            task, state = task_at(crew.tasks[r]), crew.state[r]
-            if (done >> lane) & 1:
-                fired = sea.fired[lane]
-                alone = fired != NO_TRANSITION and is_alone(task.model, mode, fired)
-                span = take_ashore(sea, task, lane)
-                room = Room(crew.rooms[r, 0], crew.rooms[r, 1], crew.rooms[r, 2], crew.rooms[r, 3], crew.clocks[r])
-                code = complete(parts, task, room, span, crew.cycles[r], crew.phases[r], alone)
-                state[CODE] = code
-                if code != GO_ON:
-                    continue
-            else:
-                state[CLOCK] = -1
+        places = places_in(model, tangents, crew.parameters, mode)
+        lane = sea.lanes[mode]
+        bits = fill(sea, crew, mode)
+        able, going, staying = step_abreast(
+            model, method, sea, lane, places, mode, tangents, mask_of(bits)
+        )
+        took, went, stays = bits_of(able), bits_of(going), bits_of(staying)
+        for row in range(ABREAST):
+            if not (bits >> row) & 1:
+                continue
+            crew.steps += 1
+            steps = lane[(places.numbers + STEPS) * ABREAST + row]
+            if (stays >> row) & 1 and steps < crew.most:
+                continue
+            arrives = (took >> row) & 1 and not (went >> row) & 1
+            refused = not (took >> row) & 1
+            r, code = go_ashore(parts, sea, crew, mode, row, arrives)
+            crew.state[r, CODE] = code
+            if code != GO_ON:
+                continue
+            if refused:
+                crew.state[r, CLOCK] = -1
             muster(advance, parts, sea, crew, r, max_steps, max_jumps)

@@ -16,6 +16,21 @@ import math
 from numba import njit
 
 from hybrid.kernels.abreast.certificate import DEGREE, certify
+from hybrid.kernels.abreast.lanes import (
+    AHEAD_OF_STAY,
+    CYCLE,
+    DIVERGENCE,
+    FOLLOWS,
+    LONGEST_STEP,
+    LOW,
+    ROOM,
+    SINCE,
+    STAY,
+    STEPS,
+    T,
+    holds_roots,
+    order_of,
+)
 from hybrid.kernels.abreast.rows import (
     binary_logarithms_of,
     bits_of,
@@ -53,9 +68,12 @@ from hybrid.kernels.steps.series_length import (
     TINY,
 )
 from hybrid.kernels.types.codes import (
+    ABREAST,
     DESINGULARISED,
     EXACT,
-    HIGHEST_ORDER,
+    FROM_LAST_STEP,
+    FROM_STATE,
+    FROM_ZERO,
     NO_TRANSITION,
     ROOTED,
 )
@@ -76,6 +94,8 @@ APART = 1e-9
 MOST_CORRECTIONS = 16
 AT_ROOT = 4.0 * EPSILON
 LONGEST = 1e100
+# Shortest step, in units of the rounding of time.
+FINEST_STEP = 4.0 * EPSILON
 
 
 @njit(**INLINE)
@@ -158,12 +178,38 @@ def trusted_length(method, sea, n, tangents, start, stride, order, exact):
 
 
 @njit(**INLINE)
-def end_of_column(powers, column, order, h):
-    """Value of a column at ``h``."""
-    total = entry_at(powers, order, column)
-    for o in range(order - 1, -1, -1):
-        total = fused(total, h, entry_at(powers, o, column))
-    return total
+def evaluate_four(powers, column, order, h, with_sizes):
+    """Values at ``h`` of four columns into row ``order + 1``, and what they are sums of into the next.
+
+    Each sum waits for itself: four run at once.
+    """
+    a, b = entry_at(powers, order, column), entry_at(powers, order, column + 1)
+    c, d = entry_at(powers, order, column + 2), entry_at(powers, order, column + 3)
+    if with_sizes:
+        size_a, size_b, size_c, size_d = magnitude(a), magnitude(b), magnitude(c), magnitude(d)
+        for o in range(order - 1, -1, -1):
+            term = entry_at(powers, o, column)
+            a, size_a = fused(a, h, term), fused(size_a, h, magnitude(term))
+            term = entry_at(powers, o, column + 1)
+            b, size_b = fused(b, h, term), fused(size_b, h, magnitude(term))
+            term = entry_at(powers, o, column + 2)
+            c, size_c = fused(c, h, term), fused(size_c, h, magnitude(term))
+            term = entry_at(powers, o, column + 3)
+            d, size_d = fused(d, h, term), fused(size_d, h, magnitude(term))
+        put_entry(powers, order + 2, column, size_a)
+        put_entry(powers, order + 2, column + 1, size_b)
+        put_entry(powers, order + 2, column + 2, size_c)
+        put_entry(powers, order + 2, column + 3, size_d)
+    else:
+        for o in range(order - 1, -1, -1):
+            a = fused(a, h, entry_at(powers, o, column))
+            b = fused(b, h, entry_at(powers, o, column + 1))
+            c = fused(c, h, entry_at(powers, o, column + 2))
+            d = fused(d, h, entry_at(powers, o, column + 3))
+    put_entry(powers, order + 1, column, a)
+    put_entry(powers, order + 1, column + 1, b)
+    put_entry(powers, order + 1, column + 2, c)
+    put_entry(powers, order + 1, column + 3, d)
 
 
 @njit(**INLINE)
@@ -178,11 +224,11 @@ def end_with_size(powers, column, order, h):
 
 
 @njit(**INLINE)
-def band_of(model, method, sea, mode, slot, order, size, h, exact):
+def band_of(model, method, sea, time, mode, slot, order, size, h, exact):
     """How far errors may move a guard: rounding of state, time and terms, tolerances, terms left out."""
     n, powers, row = model.dimension, sea.powers, order + 3 + slot
     share = ROUNDING_OF_STATE * EPSILON
-    clock = larger(magnitude(rows_at(sea.t, 0)), model.period)
+    clock = larger(magnitude(time), model.period)
     band = share * (entry_at(powers, row, n) * clock) + ROUNDING_OF_SUM * entry_at(powers, row, n + 1)
     for i in range(n):
         scale = fused(magnitude(entry_at(powers, 1, i)), h, magnitude(entry_at(powers, 0, i)))
@@ -289,21 +335,21 @@ def is_twin(model, mode, slot):
 
 
 @njit(**KERNEL)
-def first_crossing(model, method, sea, mode, order, h, exact, able):
+def first_crossing(model, method, sea, lane, places, mode, order, h, exact, able):
     """The place of the first crossing, beyond the step if there is none, and the runs for which that is proved.
 
     ``sea.fired`` gets the transitions.
     """
     n, powers, first = model.dimension, sea.powers, model.first_outgoing[mode]
-    earliest = in_every_run(2.0)
+    earliest, time = in_every_run(2.0), rows_at(lane, places.numbers + T)
     for slot in range(first, model.first_outgoing[mode + 1]):
         if is_twin(model, mode, slot):
             continue
         column = n + slot - first
         value, size = end_with_size(powers, column, order, h)
-        start, side = entry_at(powers, 0, column), entry_at(sea.sides, 0, slot - first)
-        known = entry_at(sea.sides, 1, slot - first) > 0.5
-        band = band_of(model, method, sea, mode, slot - first, order, size, h, exact)
+        start, side = entry_at(powers, 0, column), rows_at(lane, places.guards + 3 * (slot - first))
+        known = rows_at(lane, places.guards + 3 * (slot - first) + 1) > 0.5
+        band = band_of(model, method, sea, time, mode, slot - first, order, size, h, exact)
         keeps = without(start * side > size - value * side + 2.0 * band, known)
         asked = without(able, keeps)
         if bits_of(asked) == 0:
@@ -332,57 +378,145 @@ def first_crossing(model, method, sea, mode, order, h, exact, able):
     return earliest, able
 
 
-@njit(**KERNEL)
-def step_abreast(model, method, sea, mode, tangents, asked):
-    """One step of the runs of the mask ``asked`` in a mode; returns the mask of those that have taken it.
+@njit(**INLINE)
+def longest_room(model, lane, places, mode):
+    """The time until the next step must end, and that until it should: a little after the last stay ended."""
+    left = rows_at(lane, places.numbers + STAY) - rows_at(lane, places.numbers + SINCE)
+    beyond = rows_at(lane, places.numbers + AHEAD_OF_STAY)
+    return where(both(left > 0.0, beyond > 0.0), left + beyond, math.inf)
 
-    Values at the end, and what the state is a sum of, are left in the rows behind the series.
+
+@njit(**INLINE)
+def set_origins(sea, lane, places, n, order):
+    """Tell the series what they may take the roots of guards from (``steps.series.set_origins``)."""
+    follows = rows_at(lane, places.numbers + FOLLOWS) > 0.5
+    for g in range(places.count):
+        known = rows_at(lane, places.guards + 3 * g + 1) > 0.5
+        origin = where(follows, float(FROM_LAST_STEP), float(FROM_STATE))
+        put_entry(sea.powers, order + 1, n + g, rows_at(lane, places.guards + 3 * g + 2))
+        put_entry(sea.powers, order + 2, n + g, where(known, float(FROM_ZERO), origin))
+
+
+@njit(**INLINE)
+def take_step(model, sea, lane, places, mode, tangents, order, going):
+    """Move the runs of a mask to the end of the step, where they go on."""
+    n, powers, rooted = model.dimension, sea.powers, holds_roots(model, mode)
+    for i in range(n):
+        put_rows(lane, i, where(going, entry_at(powers, order + 1, i), rows_at(lane, i)))
+        size = rows_at(lane, places.sizes + i)
+        # On a guard, rounding is that of the landing.
+        put_rows(lane, places.sizes + i, where(going, entry_at(powers, order + 2, i), size))
+    for k in range(tangents):
+        begin = sea.tangent_start + k * sea.tangent_columns[mode]
+        for i in range(n):
+            place = n * (1 + k) + i
+            put_rows(lane, place, where(going, entry_at(powers, order + 1, begin + i), rows_at(lane, place)))
+    for g in range(places.count):
+        place = places.guards + 3 * g
+        put_rows(lane, place + 1, where(going, 0.0, rows_at(lane, place + 1)))
+        if rooted:
+            root = entry_at(powers, order + 1, n + g)
+            put_rows(lane, place + 2, where(going, root, rows_at(lane, place + 2)))
+    first, span = places.numbers, where(going, rows_at(sea.ends, 0), 0.0)
+    move_clock(model, lane, first, span)
+    put_rows(lane, first + SINCE, rows_at(lane, first + SINCE) + span)
+    put_rows(lane, first + LONGEST_STEP, larger(rows_at(lane, first + LONGEST_STEP), span))
+    put_rows(lane, first + ROOM, rows_at(lane, first + ROOM) - span)
+    put_rows(lane, first + STEPS, rows_at(lane, first + STEPS) + where(going, 1.0, 0.0))
+    put_rows(lane, first + FOLLOWS, where(going, 1.0, rows_at(lane, first + FOLLOWS)))
+    if tangents > 0:
+        change = where(going, entry_at(powers, order + 1, n + places.count + 1), 0.0)
+        put_rows(lane, first + DIVERGENCE, rows_at(lane, first + DIVERGENCE) + change)
+
+
+@njit(**INLINE)
+def sum_of(a, b):
+    """``a + b``, rounded, and its rounding error (``arithmetic.clock``)."""
+    total = a + b
+    part = total - a
+    return total, (a - (total - part)) + (b - part)
+
+
+@njit(**INLINE)
+def move_clock(model, lane, first, span):
+    """``arithmetic.clock.forward`` of all runs."""
+    phase, lost = sum_of(rows_at(lane, first + T), span)
+    phase, low = sum_of(phase, lost + rows_at(lane, first + LOW))
+    cycle, period = rows_at(lane, first + CYCLE), model.period
+    if period > 0.0:
+        over = phase >= period
+        while bits_of(over) != 0:
+            earlier, lost = sum_of(phase, where(over, -period, 0.0))
+            phase, low = sum_of(earlier, lost + low)
+            cycle = cycle + where(over, 1.0, 0.0)
+            over = phase >= period
+    put_rows(lane, first + T, phase)
+    put_rows(lane, first + LOW, low)
+    put_rows(lane, first + CYCLE, cycle)
+
+
+@njit(**KERNEL)
+def step_abreast(model, method, sea, lane, places, mode, tangents, asked):
+    """One step of the runs of the mask ``asked`` in a mode; the masks of those that took it, and that go on.
+
+    Those that do not go on have reached an event or the end of their room: the values at the end, and what
+    the state is a sum of, are left in the rows behind the series.
     """
     n, powers, kind = model.dimension, sea.powers, model.propagator[mode]
-    exact, on_clock = kind == EXACT, kind == DESINGULARISED
-    order, degree = HIGHEST_ORDER if exact else method.order, model.degree[mode]
-    if degree > 0:
-        order = degree
-    guards = model.first_outgoing[mode + 1] - model.first_outgoing[mode]
+    exact, on_clock, first = kind == EXACT, kind == DESINGULARISED, places.numbers
+    order, degree, guards = order_of(model, method, mode), model.degree[mode], places.count
     start, stride = sea.tangent_start, sea.tangent_columns[mode]
-    sea.series(mode, sea.t, sea.x, sea.p, order, powers)
+    if on_clock or kind == ROOTED:
+        set_origins(sea, lane, places, n, order)
+    x = lane[: places.parameters * ABREAST]
+    p = lane[places.parameters * ABREAST : first * ABREAST]
+    sea.series(mode, lane[first * ABREAST :], x, p, order, powers)
     able, h = asked, in_every_run(LONGEST)
     if degree == 0:
         weigh(method, sea, n, model.controlled, tangents, start, stride, exact)
         h, regular = trusted_length(method, sea, n, tangents, start, stride, order, exact)
         able = both(able, regular)
-    remaining, rounding = rows_at(sea.limits, 0), rows_at(sea.limits, 2)
+    remaining, t = rows_at(lane, first + ROOM), magnitude(rows_at(lane, first + T))
+    rounding = FINEST_STEP * (t if model.timed[mode] == 1 else rows_at(lane, first + SINCE))
     if not on_clock:
-        h = smaller(h, smaller(remaining, rows_at(sea.limits, 1)))
+        room = smaller(remaining, longest_room(model, lane, places, mode))
+        h = smaller(h, smaller(room, method.max_step))
         able = both(able, h < LONGEST)
     else:
         h = smaller(h, LONGEST)
     for row in range(sea.fired.shape[0]):
         sea.fired[row] = NO_TRANSITION
+    event = without(asked, asked)
     if guards > 0:
-        earliest, able = first_crossing(model, method, sea, mode, order, h, exact, able)
-        h = where(earliest <= 1.0, earliest * h, h)
+        earliest, able = first_crossing(model, method, sea, lane, places, mode, order, h, exact, able)
+        event = earliest <= 1.0
+        h = where(event, earliest * h, h)
+    # The state; guards and the clock if there is one; the divergence with tangent vectors.
+    width = n
+    if on_clock or kind == ROOTED:
+        width = n + guards + 1
+    if tangents > 0:
+        width = n + guards + 2
+    for column in range(0, width, 4):
+        evaluate_four(powers, column, order, h, True)
     time = h
     if on_clock:
-        time, size = end_with_size(powers, n + guards, order, h)
+        time, size = entry_at(powers, order + 1, n + guards), entry_at(powers, order + 2, n + guards)
         # Beyond the end of the run, or so close to it that no step leads through what would be left.
         able = both(able, time + fused(size, 4.0 * EPSILON, rounding) < remaining)
     able = both(able, time > rounding)
     total = in_every_run(0.0)
     for i in range(n):
-        value, size = end_with_size(powers, i, order, h)
-        put_entry(powers, order + 1, i, value)
-        put_entry(powers, order + 2, i, size)
-        total = total + size
+        total = total + entry_at(powers, order + 2, i)
     able = both(able, total < math.inf)
-    for g in range(guards if on_clock or kind == ROOTED else 0):
-        put_entry(powers, order + 1, n + g, end_of_column(powers, n + g, order, h))
-    if tangents > 0:
-        put_entry(powers, order + 1, n + guards + 1, end_of_column(powers, n + guards + 1, order, h))
-        for k in range(tangents):
-            for i in range(n):
-                column = start + k * stride + i
-                put_entry(powers, order + 1, column, end_of_column(powers, column, order, h))
+    for k in range(tangents):
+        for column in range(start + k * stride, start + k * stride + n, 4):
+            evaluate_four(powers, column, order, h, False)
     put_rows(sea.ends, 0, time)
     put_rows(sea.ends, 1, h)
-    return able
+    going = both(without(able, event), time < remaining)
+    take_step(model, sea, lane, places, mode, tangents, order, going)
+    if model.timed[mode] == 1:
+        late = method.rtol * rows_at(lane, first + LONGEST_STEP) < EPSILON * magnitude(rows_at(lane, first + T))
+        return able, going, without(going, late)
+    return able, going, going

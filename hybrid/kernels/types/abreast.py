@@ -11,11 +11,10 @@ class Abreast(Structure):
 
     ``series`` computes the series of a mode in ``powers (order + 3 + guards, columns)``, ``able (modes,)`` is
     1 for a mode that has one; tangent vectors begin at column ``tangent_start`` and have ``tangent_columns``
-    of a mode each. ``t (1,)``, ``x (n (1 + k),)`` and ``p (m,)`` are time, state and parameters; ``limits``
-    the time until the next step must end, and until it should; ``now (1,)`` the rounding of the time, and
-    ``sides (2, guards)`` the sign of each guard of the mode at the start, and whether it is zero there.
-    ``weights (n (1 + k),)``, ``polynomial`` and ``moved`` are scratch. A step leaves ``ends (2,)``: the time
-    and the length that it took; and by run, in ``fired (W,)``, the transition whose guard it has reached.
+    of a mode each. ``lanes (modes, entries)`` is where the runs aboard are, at the start of their next step
+    (``lanes``). ``weights (n (1 + k),)``, ``polynomial`` and ``moved`` are scratch. A step leaves ``ends
+    (2,)``: the time and the length that it took; and by run, in ``fired (W,)``, the transition whose guard it
+    has reached.
     """
 
     series: SERIES_ABREAST
@@ -23,11 +22,7 @@ class Abreast(Structure):
     tangent_start: INTEGER
     tangent_columns: INDICES
     powers: MATRIX
-    t: VECTOR
-    x: VECTOR
-    p: VECTOR
-    limits: VECTOR
-    sides: MATRIX
+    lanes: MATRIX
     weights: VECTOR
     polynomial: VECTOR
     moved: VECTOR
@@ -35,12 +30,12 @@ class Abreast(Structure):
     fired: INDICES
 
 
-class Crew(Structure, counters=("steps", "refused")):
+class Crew(Structure, counters=("steps", "refused", "parameters", "most")):
     """Runs ``tasks (R,)``, by address, that are advanced together, each to the time ``cycles`` and ``phases``.
 
     ``state (R, 3)``: the code of each. ``rooms (R, 4)`` and ``clocks (R,)`` are what is known of the next
     step of each; ``waiting (modes, R)`` the runs that wait for others in their mode, ``counts (modes,)`` of
-    them; ``lanes (W,)`` those that take a step.
+    them; of ``parameters`` there are so many, and a run leaves its lane after ``most`` steps; ``aboard (modes, W)`` those that are in a lane, -1 for none.
     """
 
     counters: INDICES
@@ -52,4 +47,4 @@ class Crew(Structure, counters=("steps", "refused")):
     clocks: INDICES
     waiting: INDEX_MATRIX
     counts: INDICES
-    lanes: INDICES
+    aboard: INDEX_MATRIX

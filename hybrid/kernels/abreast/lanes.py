@@ -1,0 +1,132 @@
+"""Where the runs that are abreast are: a run comes aboard, takes steps, and leaves when something happens.
+
+The entries of a lane are those of the state and the tangent vectors, the parameters, the numbers named here,
+the sizes of the state's components over the last step, and of each guard the side, whether it is zero at the
+start of the step, and the root that the last step ended with.
+"""
+
+from typing import NamedTuple
+
+from numba import njit
+
+from hybrid.kernels.arithmetic.clock import measured_time
+from hybrid.kernels.events.onset import BY_SPEED
+from hybrid.kernels.steps.series import AHEAD, FINEST, NEXT_TO_NOTHING
+from hybrid.kernels.types.codes import (
+    ABREAST,
+    DESINGULARISED,
+    EXACT,
+    HIGHEST_ORDER,
+    READY,
+    ROOTED,
+)
+from hybrid.kernels.types.kinds import INTEGER
+from hybrid.kernels.types.options import INLINE, KERNEL
+
+# Time, what it has lost in rounding, and whole periods; the time since the entry, the longest step; the time
+# until the next step must end; the time that the last stay took, and its share by which a step may exceed
+# that; the steps taken, the integral of div f, and whether the roots are those that a step ended with.
+T, LOW, CYCLE, SINCE, LONGEST_STEP, ROOM, STAY, AHEAD_OF_STAY, STEPS, DIVERGENCE, FOLLOWS = range(11)
+NUMBERS = 11
+
+
+class Places(NamedTuple):
+    """The first entries of the parameters, the numbers, the sizes and the guards; and the number of guards."""
+
+    parameters: INTEGER
+    numbers: INTEGER
+    sizes: INTEGER
+    guards: INTEGER
+    count: INTEGER
+
+
+@njit(**INLINE)
+def places_in(model, tangents, parameters, mode):
+    """Where the entries of a lane are."""
+    n = model.dimension
+    first = n * (1 + tangents)
+    numbers = first + parameters
+    sizes = numbers + NUMBERS
+    return Places(
+        first, numbers, sizes, sizes + n, model.first_outgoing[mode + 1] - model.first_outgoing[mode]
+    )
+
+
+@njit(**INLINE)
+def order_of(model, method, mode):
+    """The order of the series of a mode."""
+    if model.degree[mode] > 0:
+        return model.degree[mode]
+    return HIGHEST_ORDER if model.propagator[mode] == EXACT else method.order
+
+
+@njit(**INLINE)
+def holds_roots(model, mode):
+    """Whether the series of a mode hold roots of its guards."""
+    return model.propagator[mode] == DESINGULARISED or model.propagator[mode] == ROOTED
+
+
+@njit(**KERNEL)
+def come_aboard(lane, places, task, room, row):
+    """Write where a run is, at the start of a step, into its place in a lane."""
+    model, run, method, series = task.model, task.run, task.method, task.work.series
+    n, mode, order = model.dimension, run.mode, order_of(model, method, run.mode)
+    for i in range(places.parameters):
+        lane[i * ABREAST + row] = run.y[i]
+    for i in range(places.numbers - places.parameters):
+        lane[(places.parameters + i) * ABREAST + row] = model.parameters[i]
+    first = places.numbers * ABREAST + row
+    lane[first + T * ABREAST], lane[first + LOW * ABREAST] = run.phase, run.phase_low
+    lane[first + CYCLE * ABREAST], lane[first + SINCE * ABREAST] = 0.0, run.since_entry
+    lane[first + LONGEST_STEP * ABREAST], lane[first + ROOM * ABREAST] = run.longest_step, room
+    beyond = AHEAD * run.stay[mode]
+    if not beyond > NEXT_TO_NOTHING * measured_time(model, run, mode):
+        beyond = -1.0
+    lane[first + STAY * ABREAST], lane[first + AHEAD_OF_STAY * ABREAST] = run.stay[mode], beyond
+    lane[first + STEPS * ABREAST], lane[first + DIVERGENCE * ABREAST] = 0.0, 0.0
+    lane[first + FOLLOWS * ABREAST] = 1.0 if run.stage == READY else 0.0
+    for i in range(n):
+        lane[(places.sizes + i) * ABREAST + row] = run.scale[i]
+    slot, place = model.first_outgoing[mode], places.guards * ABREAST + row
+    rooted = holds_roots(model, mode)
+    for g in range(places.count):
+        transition = model.outgoing[slot + g]
+        lane[place] = run.side[transition]
+        lane[place + ABREAST] = 1.0 if run.on_guard[transition] == BY_SPEED else 0.0
+        lane[place + 2 * ABREAST] = series[order + 1, n + g] if rooted else 0.0
+        place += 3 * ABREAST
+
+
+@njit(**KERNEL)
+def leave(lane, places, task, row):
+    """Write where a run is at the start of the step from a lane back to the run."""
+    model, run, method, series = task.model, task.run, task.method, task.work.series
+    n, mode, order = model.dimension, run.mode, order_of(model, method, run.mode)
+    first = places.numbers * ABREAST + row
+    steps = int(lane[first + STEPS * ABREAST])
+    if steps == 0:
+        return
+    for i in range(places.parameters):
+        run.y[i] = lane[i * ABREAST + row]
+    run.phase, run.phase_low = lane[first + T * ABREAST], lane[first + LOW * ABREAST]
+    run.cycle += int(lane[first + CYCLE * ABREAST])
+    run.since_entry, run.longest_step = lane[first + SINCE * ABREAST], lane[first + LONGEST_STEP * ABREAST]
+    run.divergence += lane[first + DIVERGENCE * ABREAST]
+    run.steps += steps
+    run.unchecked += steps
+    for i in range(n):
+        run.scale[i] = lane[(places.sizes + i) * ABREAST + row]
+    slot, place = model.first_outgoing[mode], places.guards * ABREAST + row
+    rooted = holds_roots(model, mode)
+    for g in range(places.count):
+        run.on_guard[model.outgoing[slot + g]] = 0
+        if rooted:
+            series[order + 1, n + g] = lane[place + 2 * ABREAST]
+        place += 3 * ABREAST
+    run.stage = READY
+
+
+@njit(**INLINE)
+def finest_of(model, mode, since, t):
+    """The shortest step of runs, in units of the rounding of their time."""
+    return FINEST * (t if model.timed[mode] == 1 else since)
