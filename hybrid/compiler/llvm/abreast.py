@@ -9,6 +9,7 @@ from llvmlite import ir
 
 from hybrid.compiler.llvm.calls import CALLS, NUMBER, WHOLE
 from hybrid.compiler.llvm.lowering import TRUTH, Body, LoweringError, Signature
+from hybrid.compiler.llvm.waves import sine
 from hybrid.kernels.instructions.loops import declared, loop
 from hybrid.kernels.instructions.registers import Matrix, everywhere, multiply_add, vector_of
 from hybrid.kernels.types.codes import ABREAST
@@ -163,6 +164,8 @@ class AbreastBody(Body):
         builder = self.builder
         if name == "max":
             return CALLS[name](builder, *registers)
+        if name in ("sin", "cos"):
+            return sine(builder, *registers, shift=int(name == "cos"))
         if name in OF_REGISTERS:
             kind = ir.FunctionType(ROW, [ROW] * len(registers))
             function = declared(builder.module, kind, f"llvm.{OF_REGISTERS[name]}.v{ABREAST}f64")
