@@ -14,10 +14,11 @@ from hybrid.kernels.guards.touch import forget_touches
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT
 from hybrid.kernels.steps.field.late import is_late
 from hybrid.kernels.steps.series import land
-from hybrid.kernels.types.abreast import Abreast, Crew
+from hybrid.kernels.types.abreast import ONWARD, Abreast, Crew
 from hybrid.kernels.types.codes import (
     ABREAST,
     DESINGULARISED,
+    DONE,
     GO_ON,
     MAX_STEPS,
     NO_TRANSITION,
@@ -26,8 +27,10 @@ from hybrid.kernels.types.codes import (
 )
 from hybrid.kernels.types.kinds import INTEGER
 from hybrid.kernels.types.layout import ADVANCE, Parts, Path, Task
-from hybrid.kernels.types.numba_door.addressed import task_at
+from hybrid.kernels.types.numba_door.addressed import structure_at
 from hybrid.kernels.types.options import INLINE, KERNEL, exported
+
+task_at = structure_at(Task)
 
 
 @njit(**KERNEL)
@@ -92,34 +95,44 @@ def is_alone(model, mode, fired):
     return certain and not has_program(model, fired)
 
 
-# Columns of ``Crew.state``: the code of a run, whether it has its room for a step, and the clock that ends it.
-CODE, READY_TO_STEP, CLOCK = range(3)
+@njit(**KERNEL)
+def muster(parts, sea, crew, onward, r):
+    """Bring a run to where it takes its next step, and let it wait there; or to its end."""
+    task = task_at(crew.tasks[r])
+    while True:
+        code, room = prepare(
+            parts, task, crew.cycles[r], crew.phases[r], crew.max_steps[r], crew.max_jumps[r]
+        )
+        if code == GO_ON:
+            break
+        code = onward(parts, task, crew, r, code)
+        if code != GO_ON:
+            crew.codes[r] = code
+            return
+    queue = crew.aboard.shape[0]
+    if crew.refused[r] == 0 and is_plain(task.model, task.method, task.run, sea):
+        queue = task.run.mode
+        crew.rooms[r, 0], crew.rooms[r, 1] = room.remains, room.until
+        crew.rooms[r, 2], crew.rooms[r, 3] = room.all, room.knot
+        crew.clocks[r] = room.clock
+    crew.waiting[queue, crew.counts[queue]] = r
+    crew.counts[queue] += 1
 
 
 @njit(**KERNEL)
-def muster(advance, parts, sea, crew, r, max_steps, max_jumps):
-    """Bring a run to where it can take its next step abreast, or to its end; steps that are not plain it takes."""
-    task, state = task_at(crew.tasks[r]), crew.state[r]
-    while True:
-        code, room = prepare(parts, task, crew.cycles[r], crew.phases[r], max_steps, max_jumps)
-        state[CODE] = code
+def step_alone(advance, parts, sea, crew, onward, r):
+    """One step of a run that is not taken abreast, with what follows at its end."""
+    task = task_at(crew.tasks[r])
+    most = min(crew.max_steps[r], task.run.steps + 1)
+    crew.alone += 1
+    crew.refused[r] = 0
+    code = advance(parts, task, crew.cycles[r], crew.phases[r], most, crew.max_jumps[r])
+    if code != MAX_STEPS or task.run.steps >= crew.max_steps[r]:
+        code = onward(parts, task, crew, r, code)
         if code != GO_ON:
+            crew.codes[r] = code
             return
-        if state[CLOCK] >= 0 and is_plain(task.model, task.method, task.run, sea):
-            crew.rooms[r, 0], crew.rooms[r, 1] = room.remains, room.until
-            crew.rooms[r, 2], crew.rooms[r, 3] = room.all, room.knot
-            crew.clocks[r] = room.clock
-            mode = task.run.mode
-            crew.waiting[mode, crew.counts[mode]] = r
-            crew.counts[mode] += 1
-            return
-        state[CLOCK] = 0
-        crew.refused += 1
-        most = min(max_steps, task.run.steps + 1)
-        code = advance(parts, task, crew.cycles[r], crew.phases[r], most, max_jumps)
-        if code != MAX_STEPS or most == max_steps:
-            state[CODE] = code
-            return
+    muster(parts, sea, crew, onward, r)
 
 
 @njit(**KERNEL)
@@ -144,7 +157,7 @@ def fill(sea, crew, mode):
 def fullest(crew):
     """The mode that has most runs, aboard or waiting; -1 if there are none."""
     found, most = -1, 0
-    for mode in range(crew.counts.shape[0]):
+    for mode in range(crew.aboard.shape[0]):
         count = crew.counts[mode]
         for row in range(ABREAST):
             count += 1 if crew.aboard[mode, row] >= 0 else 0
@@ -155,57 +168,85 @@ def fullest(crew):
 
 @njit(**KERNEL)
 def go_ashore(parts, sea, crew, mode, row, took):
-    """Let a run leave its lane: at the end of a step that it took, or where it was at the start."""
-    r = crew.aboard[mode, row]
+    """Let a run leave its lane: at the end of a step that it took, or where it was at the start.
+
+    Returns its number, and GO_ON or why it ends.
+    """
+    r, lane = crew.aboard[mode, row], sea.lanes[mode]
     crew.aboard[mode, row] = -1
     task = task_at(crew.tasks[r])
     places = places_in(task.model, task.tangents, crew.parameters, mode)
-    lane = sea.lanes[mode]
-    remains = lane[(places.numbers + ROOM) * ABREAST + row]
-    passed = crew.rooms[r, 2] - remains
+    left = lane[(places.numbers + ROOM) * ABREAST + row]
+    passed = crew.rooms[r, 2] - left
     leave(lane, places, task, row)
-    room = Room(
-        crew.rooms[r, 0] - passed, crew.rooms[r, 1] - passed, remains, crew.rooms[r, 3], crew.clocks[r]
-    )
     if not took:
         return r, GO_ON
     fired = sea.fired[row]
     alone = fired != NO_TRANSITION and is_alone(task.model, mode, fired)
     span = take_ashore(sea, task, row)
+    room = Room(
+        crew.rooms[r, 0] - passed, crew.rooms[r, 1] - passed, left, crew.rooms[r, 3], crew.clocks[r]
+    )
     return r, complete(parts, task, room, span, crew.cycles[r], crew.phases[r], alone)
 
 
-@exported(None, ADVANCE, Parts, Abreast, Crew, INTEGER, INTEGER)
-def advance_abreast(advance, parts, sea, crew, max_steps, max_jumps):
-    """Advance the runs of a crew, each to its own time; ``crew.state`` gets their codes."""
-    for r in range(crew.tasks.shape[0]):
-        muster(advance, parts, sea, crew, r, max_steps, max_jumps)
-    first = task_at(crew.tasks[0])
-    model, method, tangents = first.model, first.method, first.tangents
-    while True:
+@njit(**KERNEL)
+def step_together(parts, sea, crew, onward, mode):
+    """One step of the runs in the lanes of a mode; those to whom something happens leave."""
+    bits = fill(sea, crew, mode)
+    first = crew.aboard[mode, 0]
+    for row in range(ABREAST):
+        first = max(first, crew.aboard[mode, row])
+    task, lane = task_at(crew.tasks[first]), sea.lanes[mode]
+    places = places_in(task.model, task.tangents, crew.parameters, mode)
+    able, going, staying = step_abreast(
+        task.model, task.method, sea, lane, places, mode, task.tangents, mask_of(bits)
+    )
+    took, went, stays = bits_of(able), bits_of(going), bits_of(staying)
+    for row in range(ABREAST):
+        if not (bits >> row) & 1:
+            continue
+        crew.steps += 1
+        if (stays >> row) & 1 and lane[(places.numbers + STEPS) * ABREAST + row] < crew.longest:
+            continue
+        arrives = (took >> row) & 1 and not (went >> row) & 1
+        r, code = go_ashore(parts, sea, crew, mode, row, arrives)
+        if not (took >> row) & 1:
+            crew.refused[r] = 1
+        if code != GO_ON:
+            code = onward(parts, task_at(crew.tasks[r]), crew, r, code)
+        if code != GO_ON:
+            crew.codes[r] = code
+            continue
+        muster(parts, sea, crew, onward, r)
+
+
+@exported(INTEGER, ADVANCE, Parts, Abreast, Crew, ONWARD)
+def advance_abreast(advance, parts, sea, crew, onward):
+    """Advance the runs of a crew until they are over; their codes are in ``crew.codes``.
+
+    Returns DONE, or GO_ON if the budget of steps was used up, after which the next call goes on.
+    """
+    if crew.begun == 0:
+        crew.begun = 1
+        for r in range(crew.tasks.shape[0]):
+            muster(parts, sea, crew, onward, r)
+    alone = crew.aboard.shape[0]
+    while crew.steps + crew.alone < crew.budget:
+        # One at a time, and all those that are alone before the others, who wait for them.
+        if crew.counts[alone] > 0:
+            crew.counts[alone] -= 1
+            r = crew.waiting[alone, crew.counts[alone]]
+            step_alone(advance, parts, sea, crew, onward, r)
+            continue
         mode = fullest(crew)
         if mode < 0:
-            return
-        places = places_in(model, tangents, crew.parameters, mode)
-        lane = sea.lanes[mode]
-        bits = fill(sea, crew, mode)
-        able, going, staying = step_abreast(
-            model, method, sea, lane, places, mode, tangents, mask_of(bits)
-        )
-        took, went, stays = bits_of(able), bits_of(going), bits_of(staying)
-        for row in range(ABREAST):
-            if not (bits >> row) & 1:
-                continue
-            crew.steps += 1
-            steps = lane[(places.numbers + STEPS) * ABREAST + row]
-            if (stays >> row) & 1 and steps < crew.most:
-                continue
-            arrives = (took >> row) & 1 and not (went >> row) & 1
-            refused = not (took >> row) & 1
-            r, code = go_ashore(parts, sea, crew, mode, row, arrives)
-            crew.state[r, CODE] = code
-            if code != GO_ON:
-                continue
-            if refused:
-                crew.state[r, CLOCK] = -1
-            muster(advance, parts, sea, crew, r, max_steps, max_jumps)
+            return DONE
+        step_together(parts, sea, crew, onward, mode)
+    return GO_ON
+
+
+@exported(INTEGER, Parts, Task, Crew, INTEGER, INTEGER)
+def stay_there(parts, task, crew, r, code):
+    """A run that is over at its time (``ONWARD``)."""
+    return code

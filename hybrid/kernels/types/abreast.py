@@ -1,6 +1,7 @@
 """Runs that take their steps together."""
 
 from hybrid.kernels.types.kinds import INDEX_MATRIX, INDICES, INTEGER, MATRIX, VECTOR, function
+from hybrid.kernels.types.layout import Parts, Task
 from hybrid.kernels.types.structure import Structure
 
 SERIES_ABREAST = function(None, INTEGER, VECTOR, VECTOR, VECTOR, INTEGER, MATRIX)
@@ -30,21 +31,38 @@ class Abreast(Structure):
     fired: INDICES
 
 
-class Crew(Structure, counters=("steps", "refused", "parameters", "most")):
-    """Runs ``tasks (R,)``, by address, that are advanced together, each to the time ``cycles`` and ``phases``.
+class Crew(Structure, counters=("parameters", "longest", "begun", "steps", "alone", "budget")):
+    """Runs ``tasks (R,)``, by address, that are advanced together.
 
-    ``state (R, 3)``: the code of each. ``rooms (R, 4)`` and ``clocks (R,)`` are what is known of the next
-    step of each; ``waiting (modes, R)`` the runs that wait for others in their mode, ``counts (modes,)`` of
-    them; of ``parameters`` there are so many, and a run leaves its lane after ``most`` steps; ``aboard (modes, W)`` those that are in a lane, -1 for none.
+    Each goes to its own time, ``cycles`` and ``phases (R,)``, in no more than ``max_steps`` and ``max_jumps
+    (R,)``. What is next when it gets there, or ends before, a function decides (``ONWARD``), which finds what
+    belongs to a run at the address in ``jobs (R,)``. ``codes (R,)`` are GO_ON for runs under way, else how
+    they ended; ``refused (R,)`` is 1 for a run whose next step is not taken abreast. ``rooms (R, 4)`` and
+    ``clocks (R,)`` are what is known of the next step of each.
+
+    ``waiting (modes + 1, R)`` are the runs that wait for others in their mode, and in the last row those that
+    step alone, ``counts (modes + 1,)`` of them; ``aboard (modes, W)`` those that are in a lane, -1 for none.
+    A model has so many ``parameters``; a run leaves its lane after the ``longest`` stay, in steps; with
+    ``begun`` 0 the runs have not been brought to their first steps. So many ``steps`` have been taken abreast,
+    and by runs ``alone``; a call ends when both have reached the ``budget``.
     """
 
     counters: INDICES
     tasks: INDICES
+    jobs: INDICES
     cycles: INDICES
     phases: VECTOR
-    state: INDEX_MATRIX
+    max_steps: INDICES
+    max_jumps: INDICES
+    codes: INDICES
+    refused: INDICES
     rooms: MATRIX
     clocks: INDICES
     waiting: INDEX_MATRIX
     counts: INDICES
     aboard: INDEX_MATRIX
+
+
+# What a run does next, given its number and the code with which it has come to its time, or ended: GO_ON if
+# it has a new time, or the code with which it is over.
+ONWARD = function(INTEGER, Parts, Task, Crew, INTEGER, INTEGER)
