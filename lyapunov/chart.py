@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from functools import cached_property
+from collections.abc import Mapping, Sequence
+from functools import cached_property, partial
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +30,7 @@ from lyapunov.spectrum import (
     number_of_exponents,
     orthonormal_at_start,
 )
+from lyapunov.together import alike, means_together, result_of
 
 if TYPE_CHECKING:
     import xarray
@@ -162,13 +163,46 @@ class Exponents:
 
     def __call__(self, point: Mapping[str, float], place: Place | None = None) -> dict[str, Any]:
         """The results of one row."""
-        return self.rows.grown(lambda rows: self._row(rows, point, place))
+        [found] = self.together([point], [place])
+        if isinstance(found, Exception):
+            raise found
+        return found
+
+    def together(
+        self, points: Sequence[Mapping[str, float]], places: Sequence[Place | None]
+    ) -> list[dict[str, Any] | Exception]:
+        """The results of several rows, each of which is what it is alone; or the error of a row."""
+        if self.rows.system.growth is not None:
+            return [
+                result_of(partial(self.rows.grown, partial(self._row, point=point, place=place)))
+                for point, place in zip(points, places, strict=True)
+            ]
+        begun = [result_of(partial(self._begun, self.rows, *each)) for each in zip(points, places, strict=True)]
+        found: list[Any] = list(begun)
+        for rows in alike(begun):
+            means = means_together([begun[i] for i in rows], self.transient, self.intervals)
+            for i, each in zip(rows, means, strict=True):
+                found[i] = (
+                    each
+                    if isinstance(each, Exception)
+                    else result_of(partial(self._results, self.rows, points[i], begun[i], each))
+                )
+        return found
 
     def _row(self, rows: Rows, point: Mapping[str, float], place: Place | None) -> dict[str, Any]:
+        estimate = self._begun(rows, point, place)
+        means = estimate.run(self.transient, self.intervals, False, silent())
+        return self._results(rows, point, estimate, means)
+
+    def _begun(self, rows: Rows, point: Mapping[str, float], place: Place | None) -> Estimate:
         trajectory = rows.begin(point, place, self._vectors, rows.system)
         orthonormal_at_start(trajectory)
-        estimate = Estimate(trajectory, self._length(trajectory), self.k)
-        means = estimate.run(self.transient, self.intervals, False, silent())
+        return Estimate(trajectory, self._length(trajectory), self.k)
+
+    def _results(
+        self, rows: Rows, point: Mapping[str, float], estimate: Estimate, means: Means
+    ) -> dict[str, Any]:
+        trajectory = estimate.trajectory
         found = {
             "exponents": means.exponents,
             "standard_error": means.standard_error,

@@ -3,8 +3,10 @@
 from functools import cache
 from typing import Any
 
+import numpy as np
+
 from hybrid.accuracy.averages import MAX_BATCHES
-from hybrid.kernels.types.kinds import INDICES, MATRIX, VECTOR
+from hybrid.kernels.types.kinds import INDICES, MATRIX, REAL, VECTOR
 from hybrid.kernels.types.structure import Layout, Structure
 
 
@@ -29,6 +31,19 @@ class Sums(Structure):
     batch_state: INDICES
 
 
+class Growth(Structure, counters=("done", "count")):
+    """The intervals of one run among others: so many are ``done`` of a ``count``.
+
+    ``rates (M, k + 1 + T)`` are those of ``lyapunov.kernels.growth_rates``.
+    """
+
+    counters: INDICES
+    end: End  # type: ignore[valid-type]
+    sums: Sums  # type: ignore[valid-type]
+    interval: REAL
+    rates: MATRIX
+
+
 END = Layout(End, {"counters": (2,), "numbers": (1,)})
 
 
@@ -37,6 +52,17 @@ def end_at(run: Any) -> Any:
     end = END.zeros()
     end.cycle, end.phase = run.cycle, run.phase
     return end
+
+
+def growth_of(end: Any, sums: Any, interval: float, intervals: int, columns: int) -> Any:
+    """A ``Growth`` with room for so many intervals."""
+    return Growth(
+        counters=np.zeros(2, dtype=np.int64),
+        end=end,
+        sums=sums,
+        interval=interval,
+        rates=np.zeros((intervals, columns)),
+    )
 
 
 @cache

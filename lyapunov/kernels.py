@@ -5,9 +5,11 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.tangent import orthonormalise
+from hybrid.kernels.types.abreast import Crew
 from hybrid.kernels.types.codes import (
     DONE,
     ENTERING,
+    GO_ON,
     MAX_JUMPS,
     NO_TRANSITION,
     READY,
@@ -15,13 +17,15 @@ from hybrid.kernels.types.codes import (
 )
 from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL, TRUTH
 from hybrid.kernels.types.layout import ADVANCE, Parts, Task
+from hybrid.kernels.types.numba_door.addressed import structure_at
 from hybrid.kernels.types.options import KERNEL, exported
 from lyapunov import batches
-from lyapunov.interval import End, Sums
+from lyapunov.interval import End, Growth, Sums
 
 UNLIMITED = 9223372036854775807
 
 push = njit(**KERNEL)(batches.push)
+growth_at = structure_at(Growth)
 
 
 @njit(**KERNEL)
@@ -57,32 +61,65 @@ def growth_rates(advance, parts, task, end, sums, interval, max_steps, resumed, 
     driver's code; ``end.done`` is how many intervals were completed. After ``MAX_STEPS`` the next call
     resumes the interval that was not completed: ``resumed``.
     """
-    hits = sums.hits
-    run, period, n, tangents = task.run, task.model.period, task.model.dimension, task.tangents
     for done in range(rates.shape[0]):
         end.done = done
         if done > 0 or not resumed:
-            for c in range(tangents):
-                run.growth[c] = 0.0
-            run.divergence, run.log_determinant = 0.0, 0.0
-            for i in range(hits.shape[0]):
-                hits[i] = 0
-            end.cycle, end.phase = later(period, end.cycle, end.phase, interval)
-        code = advance_and_count(advance, parts, task, end.cycle, end.phase, max_steps, hits)
+            begin_interval(task, end, sums, interval)
+        code = advance_and_count(advance, parts, task, end.cycle, end.phase, max_steps, sums.hits)
         if code != DONE:
             return code
-        run.indistinct += orthonormalise(run.y, n, tangents, run.growth, task.work.jacobian, False, 0)
-        run.strain = 0.0
-        if run.stage == READY:
-            run.stage = STALE
-        for c in range(tangents):
-            rates[done, c] = run.growth[c] / interval
-        rates[done, tangents] = (run.divergence + run.log_determinant) / interval
-        for i in range(hits.shape[0]):
-            rates[done, tangents + 1 + i] = hits[i] / interval
-        push(sums.batches, sums.batch_state, rates[done])
+        end_interval(task, sums, interval, rates[done])
     end.done = rates.shape[0]
     return DONE
+
+
+@njit(**KERNEL)
+def begin_interval(task, end, sums, interval):
+    """Begin an interval: ``end`` becomes its end."""
+    run = task.run
+    for c in range(task.tangents):
+        run.growth[c] = 0.0
+    run.divergence, run.log_determinant = 0.0, 0.0
+    for i in range(sums.hits.shape[0]):
+        sums.hits[i] = 0
+    end.cycle, end.phase = later(task.model.period, end.cycle, end.phase, interval)
+
+
+@njit(**KERNEL)
+def end_interval(task, sums, interval, rates):
+    """End an interval: its growth rates into ``rates (k + 1 + T,)``, and into the batches."""
+    run, n, tangents, hits = task.run, task.model.dimension, task.tangents, sums.hits
+    run.indistinct += orthonormalise(run.y, n, tangents, run.growth, task.work.jacobian, False, 0)
+    run.strain = 0.0
+    if run.stage == READY:
+        run.stage = STALE
+    for c in range(tangents):
+        rates[c] = run.growth[c] / interval
+    rates[tangents] = (run.divergence + run.log_determinant) / interval
+    for i in range(hits.shape[0]):
+        rates[tangents + 1 + i] = hits[i] / interval
+    push(sums.batches, sums.batch_state, rates)
+
+
+@exported(INTEGER, Parts, Task, Crew, INTEGER, INTEGER)
+def growth_of_run(parts, task, crew, r, code):
+    """What a run does next whose growth rates are those of ``growth_rates`` (``ONWARD``)."""
+    growth, run = growth_at(crew.jobs[r]), task.run
+    if code == MAX_JUMPS:
+        growth.sums.hits[run.pending] += 1
+        crew.max_jumps[r] = run.jumps + 1
+        return GO_ON
+    if code == DONE:
+        end_interval(task, growth.sums, growth.interval, growth.rates[growth.done])
+        growth.done += 1
+        if growth.done == growth.count:
+            return DONE
+    elif code != GO_ON:
+        return code
+    begin_interval(task, growth.end, growth.sums, growth.interval)
+    crew.cycles[r], crew.phases[r] = growth.end.cycle, growth.end.phase
+    crew.max_jumps[r] = run.jumps
+    return GO_ON
 
 
 @njit(**KERNEL)

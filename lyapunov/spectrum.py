@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
 from functools import cache
 from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -378,10 +378,27 @@ class Estimate:
 
     def run(self, transient: int, intervals: int, history: bool, bar: Progress) -> Means:
         """What is found over ``intervals`` intervals, after ``transient`` intervals."""
+        work = self.rounds(transient, intervals, history)
+        rates = next(work)
+        while True:
+            try:
+                rates = work.send(self._filled(rates, bar))
+            except StopIteration as end:
+                found: Means = end.value
+                return found
+
+    def rounds(
+        self, transient: int, intervals: int, history: bool
+    ) -> Generator[np.ndarray, tuple[int, int], Means]:
+        """``run``, which leaves to others how the intervals are computed.
+
+        It yields arrays for the growth rates of the next intervals, and is sent how many of their rows are
+        filled, and the code of the run.
+        """
         trajectory, k = self.trajectory, self.k
         system, code = trajectory.system, codes.DONE
         if transient:
-            _, code = self._collect(transient, None, False, bar)
+            _, code = yield from self._collect(transient, None, False)
             self.sums.batch_state[:] = EMPTY
             self._replace_annihilated()
             # A vector of which only rounding was left is by now a new direction, like those at the start.
@@ -391,7 +408,7 @@ class Estimate:
         self.grazed_growth = trajectory.run.ill_conditioned_growth
         growths = np.empty((0, k))
         if code == codes.DONE:
-            growths, code = self._collect(intervals, mean, history, bar)
+            growths, code = yield from self._collect(intervals, mean, history)
         values = self._completed(mean.value())
         means = self._completed(closed_batch_means(self.sums.batches, self.sums.batch_state))
         error = standard_error_from_batches(means[:, :k]) * taper_inflation()
@@ -413,28 +430,33 @@ class Estimate:
         )
 
     def _collect(
-        self, intervals: int, mean: TaperedMean | None, history: bool, bar: Progress
-    ) -> tuple[np.ndarray, int]:
-        total = 0
+        self, intervals: int, mean: TaperedMean | None, history: bool
+    ) -> Generator[np.ndarray, tuple[int, int], tuple[np.ndarray, int]]:
+        total, code = 0, int(codes.DONE)
         kept = [np.empty((0, self.k))]
-        bursts, code = Bursts([self.trajectory]), codes.DONE
         while total < intervals and code == codes.DONE:
             # Add whole blocks to the mean, so that its rounding does not depend on where bursts end.
             rates = np.empty((min(INTERVALS_AT_ONCE, intervals - total), self.columns))
-            filled, resumed = 0, False
-            while filled < len(rates) and code in (codes.DONE, codes.GO_ON):
-                code = self._rates(bursts.most(), resumed, rates[filled:])
-                done = int(self.end.done)
-                filled += done
-                bar.update(done)
-                code = bursts.judged(code)
-                resumed = code == codes.GO_ON
+            filled, code = yield rates
             total += filled
             if mean is not None:
                 mean.add(rates[:filled])
             if history:
                 kept.append(self._completed(rates[:filled])[:, : self.k])
         return np.concatenate(kept) if history else kept[0], code
+
+    def _filled(self, rates: np.ndarray, bar: Progress) -> tuple[int, int]:
+        """Fill the rows of ``rates`` in bursts; how many were filled, and the code of the run."""
+        filled, resumed, code = 0, False, int(codes.DONE)
+        bursts = Bursts([self.trajectory])
+        while filled < len(rates) and code in (codes.DONE, codes.GO_ON):
+            code = self._rates(bursts.most(), resumed, rates[filled:])
+            done = int(self.end.done)
+            filled += done
+            bar.update(done)
+            code = bursts.judged(code)
+            resumed = code == codes.GO_ON
+        return filled, code
 
     def _completed(self, rates: np.ndarray) -> np.ndarray:
         """Rates ``(..., columns)`` with the last growth: what the others leave of the sum, if not carried."""

@@ -5,13 +5,13 @@
 # alone, such as one and its sections, share the fields.
 FIELDS, EVENTS, VARIATIONAL = "fields", "events", "variational field"
 SERIES, TANGENT_SERIES = "series", "tangent series"
-ABREAST, ABREAST_TANGENT = "series abreast", "tangent series abreast"
+ABREAST_SERIES, ABREAST_TANGENT_SERIES = "series abreast", "tangent series abreast"
 PARTS = {
     FIELDS: ("field", "field_jacobian"),
     EVENTS: ("guard", "guard_gradient", "guard_curvature", "reset", "reset_jacobian"),
     VARIATIONAL: ("variational_field",),
     SERIES: ("series",),
     TANGENT_SERIES: ("tangent_series",),
-    ABREAST: ("series_abreast",),
-    ABREAST_TANGENT: ("tangent_series_abreast",),
+    ABREAST_SERIES: ("series_abreast",),
+    ABREAST_TANGENT_SERIES: ("tangent_series_abreast",),
 }

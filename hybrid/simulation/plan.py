@@ -57,6 +57,8 @@ class Plan:
     work_layout: Any
     ticks: Callable[[np.ndarray, np.ndarray], list[float]] | None = None
     spares: list[Memory] = attrs.field(factory=list, init=False)
+    # What crews of the plan have in common, once it is known (``crew``).
+    together: list[Any] = attrs.field(factory=list, init=False)
 
     def memory(self) -> Memory:
         """The memory for a run."""

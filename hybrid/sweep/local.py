@@ -7,6 +7,7 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from itertools import islice
 from queue import Empty, Queue, SimpleQueue
 from time import perf_counter
 from typing import Any
@@ -16,7 +17,9 @@ import numpy as np
 
 from hybrid.compiler.interrupts import CTRL_C, stopped_by
 from hybrid.sweep.job import Job, Rhythm, carried
-from hybrid.sweep.outcome import Batch, Outcome, Part, attempt
+from hybrid.kernels.types.codes import ABREAST
+from hybrid.simulation.crew import TOGETHER
+from hybrid.sweep.outcome import Batch, Outcome, Part, attempt, attempts
 
 # Seconds between two looks for Ctrl-C, and how long workers may take to end after it: a task that calls
 # nothing of the library is not told, and its point is given up.
@@ -41,19 +44,19 @@ def run_in_threads(
 ) -> bool:
     """Compute all missing points; False if Ctrl-C ended it early. ``keep`` is called from any thread."""
     if pool is not None:
-        return _Run(job, keep, stored).run(pool, pool._max_workers, report)
+        return _Run(job, keep, stored, pool._max_workers).run(pool, report)
     workers = min(threads or cores(), max(len(job.rows), 1))
     own = ThreadPoolExecutor(workers, thread_name_prefix="sweep")
     try:
-        return _Run(job, keep, stored).run(own, workers, report)
+        return _Run(job, keep, stored, workers).run(own, report)
     finally:
         # The workers have ended by now, or have been given up.
         own.shutdown(wait=False)
 
 
 class _Run:
-    def __init__(self, job: Job, keep: Callable[[Part], None], stored: bool) -> None:
-        self.job, self.keep, self.stored = job, keep, stored
+    def __init__(self, job: Job, keep: Callable[[Part], None], stored: bool, workers: int) -> None:
+        self.job, self.keep, self.stored, self.workers = job, keep, stored, workers
         self.stop = threading.Event()
         self.lock, self.is_over = threading.Lock(), False
         # What the workers have computed and not passed on yet.
@@ -61,14 +64,16 @@ class _Run:
         # Numbers of points that were kept, an error, or None from a worker that has ended.
         # A SimpleQueue waits without end if its time is over when it has heard a signal.
         self.reports: Queue[int | BaseException | None] = Queue()
-        self.source: _Alone | _InLine = _Alone(job) if job.lines is None else _InLine(job, self.stop)
+        self.source: _Alone | _InLine = (
+            _Alone(job, workers) if job.lines is None else _InLine(job, self.stop)
+        )
 
-    def run(self, pool: ThreadPoolExecutor, workers: int, report: Callable[[int], object]) -> bool:
+    def run(self, pool: ThreadPoolExecutor, report: Callable[[int], object]) -> bool:
         """Start the workers and wait for them."""
-        failure, working, latest = None, workers, math.inf
+        failure, working, latest = None, self.workers, math.inf
         with CTRL_C:
             try:
-                for _ in range(workers):
+                for _ in range(self.workers):
                     pool.submit(self._work)
                 while working and perf_counter() < latest:
                     try:
@@ -140,14 +145,21 @@ class _Run:
 class _Alone:
     """Points that do not depend on one another."""
 
-    def __init__(self, job: Job) -> None:
+    def __init__(self, job: Job, workers: int) -> None:
         self.job = job
         # Shared by the threads; each row is handed out once.
         self.rows = iter(job.rows.tolist())
+        # Threads end at about the same time.
+        self.at_once = max(ABREAST, min(TOGETHER, len(job.rows) // (2 * workers)))
 
     def outcomes(self) -> Iterator[tuple[int, Outcome]]:
         """Rows and outcomes, computed when asked for."""
         task, points = self.job.task, self.job.points
+        if hasattr(task, "together"):
+            while rows := list(islice(self.rows, self.at_once)):
+                yield from zip(
+                    rows, attempts(task, [*map(points.at, rows)], [None] * len(rows)), strict=True
+                )
         for row in self.rows:
             yield row, attempt(task, points.at(row))
 

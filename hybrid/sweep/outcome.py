@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -75,6 +75,17 @@ class Part:
 def text_of(status: Status) -> str:
     """Message and remedy of a status."""
     return f"{status.message} {status.remedy}" if status.remedy else status.message
+
+
+def attempts(task: Any, points: Sequence[Any], states: Sequence[Any]) -> list[Outcome]:
+    """The outcomes of several points of a task that computes them together."""
+    return [attempt(_given, each) for each in task.together(points, states)]
+
+
+def _given(result: Any) -> Any:
+    if isinstance(result, Exception):
+        raise result
+    return result
 
 
 def attempt(task: Callable[..., Any], *given: Any) -> Outcome:

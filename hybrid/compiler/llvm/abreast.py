@@ -8,8 +8,9 @@ from typing import Any, ClassVar
 from llvmlite import ir
 
 from hybrid.compiler.llvm.calls import CALLS, NUMBER, WHOLE
-from hybrid.compiler.llvm.lowering import TRUTH, Body, LoweringError, Signature
+from hybrid.compiler.llvm.lowering import TRUTH, Body, Signature
 from hybrid.compiler.llvm.waves import sine
+from hybrid.compiler.statements.code import LoweringError
 from hybrid.kernels.instructions.loops import declared, loop
 from hybrid.kernels.instructions.registers import Matrix, everywhere, multiply_add, vector_of
 from hybrid.kernels.types.codes import ABREAST

@@ -14,7 +14,7 @@ import attrs
 from llvmlite import ir
 
 from hybrid.compiler.llvm.calls import CALLS, NUMBER, WHOLE
-from hybrid.compiler.statements.code import KNOWN
+from hybrid.compiler.statements.code import KNOWN, LoweringError
 from hybrid.kernels.instructions.loops import loop
 from hybrid.kernels.instructions.registers import Matrix, everywhere, vector_of
 from hybrid.kernels.types.codes import NARROW
@@ -40,10 +40,6 @@ ARRAYS = {
     for axes in (1, 2)
 }
 DATA, SHAPE = 4, 5
-
-
-class LoweringError(Exception):
-    """The code has something that compiled functions do not have."""
 
 
 @attrs.frozen

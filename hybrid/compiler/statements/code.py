@@ -49,6 +49,10 @@ KNOWN = {
 }
 
 
+class LoweringError(Exception):
+    """The code has something that compiled functions do not have."""
+
+
 class Code(tuple[Any, ...]):
     """A term that is no number; Python's operators on it write further terms."""
 

@@ -167,7 +167,7 @@ def fullest(crew):
 
 
 @njit(**KERNEL)
-def go_ashore(parts, sea, crew, mode, row, took):
+def go_ashore(parts, sea, crew, mode, row, took, went):
     """Let a run leave its lane: at the end of a step that it took, or where it was at the start.
 
     Returns its number, and GO_ON or why it ends.
@@ -180,6 +180,9 @@ def go_ashore(parts, sea, crew, mode, row, took):
     passed = crew.rooms[r, 2] - left
     leave(lane, places, task, row)
     if not took:
+        if (went >> row) & 1 and task.tangents > 0 and task.orthonormal != 0:
+            task.run.unchecked -= 1
+            parts.keep_apart(task.model, task.run, mode, task.tangents, task.work.jacobian)
         return r, GO_ON
     fired = sea.fired[row]
     alone = fired != NO_TRANSITION and is_alone(task.model, mode, fired)
@@ -207,10 +210,10 @@ def step_together(parts, sea, crew, onward, mode):
         if not (bits >> row) & 1:
             continue
         crew.steps += 1
-        if (stays >> row) & 1 and lane[(places.numbers + STEPS) * ABREAST + row] < crew.longest:
+        if (stays >> row) & 1 and lane[(places.numbers + STEPS) * ABREAST + row] < crew.longest[mode]:
             continue
         arrives = (took >> row) & 1 and not (went >> row) & 1
-        r, code = go_ashore(parts, sea, crew, mode, row, arrives)
+        r, code = go_ashore(parts, sea, crew, mode, row, arrives, went)
         if not (took >> row) & 1:
             crew.refused[r] = 1
         if code != GO_ON:
@@ -230,6 +233,11 @@ def advance_abreast(advance, parts, sea, crew, onward):
     if crew.begun == 0:
         crew.begun = 1
         for r in range(crew.tasks.shape[0]):
+            if crew.codes[r] != GO_ON:
+                continue
+            crew.codes[r] = onward(parts, task_at(crew.tasks[r]), crew, r, GO_ON)
+            if crew.codes[r] != GO_ON:
+                continue
             muster(parts, sea, crew, onward, r)
     alone = crew.aboard.shape[0]
     while crew.steps + crew.alone < crew.budget:

@@ -31,7 +31,7 @@ class Abreast(Structure):
     fired: INDICES
 
 
-class Crew(Structure, counters=("parameters", "longest", "begun", "steps", "alone", "budget")):
+class Crew(Structure, counters=("parameters", "begun", "steps", "alone", "budget")):
     """Runs ``tasks (R,)``, by address, that are advanced together.
 
     Each goes to its own time, ``cycles`` and ``phases (R,)``, in no more than ``max_steps`` and ``max_jumps
@@ -42,8 +42,8 @@ class Crew(Structure, counters=("parameters", "longest", "begun", "steps", "alon
 
     ``waiting (modes + 1, R)`` are the runs that wait for others in their mode, and in the last row those that
     step alone, ``counts (modes + 1,)`` of them; ``aboard (modes, W)`` those that are in a lane, -1 for none.
-    A model has so many ``parameters``; a run leaves its lane after the ``longest`` stay, in steps; with
-    ``begun`` 0 the runs have not been brought to their first steps. So many ``steps`` have been taken abreast,
+    ``longest (modes,)`` is the number of steps after which a run leaves its lane. A model has so many
+    ``parameters``; with ``begun`` 0 the runs have not been brought to their first steps. So many ``steps`` have been taken abreast,
     and by runs ``alone``; a call ends when both have reached the ``budget``.
     """
 
@@ -61,8 +61,9 @@ class Crew(Structure, counters=("parameters", "longest", "begun", "steps", "alon
     waiting: INDEX_MATRIX
     counts: INDICES
     aboard: INDEX_MATRIX
+    longest: INDICES
 
 
-# What a run does next, given its number and the code with which it has come to its time, or ended: GO_ON if
-# it has a new time, or the code with which it is over.
+# What a run does next, given its number and the code with which it has come to its time, or ended; GO_ON at the
+# beginning. The result is GO_ON if it has a new time, or the code with which it is over.
 ONWARD = function(INTEGER, Parts, Task, Crew, INTEGER, INTEGER)
