@@ -382,6 +382,8 @@ def prepare(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         if tick <= band:
             run.pending = fires_at_tick(parts, task, stop_cycle, stop_phase)
             continue
+        if remaining <= 0.0 and run.distant == 1:
+            return DONE, NO_ROOM
         if remaining <= 0.0:
             fired = parts.arrived(task)
             if fired == NO_TRANSITION:
@@ -437,6 +439,7 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         code, room = prepare(parts, task, stop_cycle, stop_phase, max_steps, max_jumps)
         if code != GO_ON:
             return code
+        task.run.distant = 0
         code, span = step(parts, task, room.all)
         if code != GO_ON:
             return int(code)

@@ -98,6 +98,7 @@ def _together(compiled: CompiledSystem, plan: Any, tangents: int) -> Together | 
     width, length = codes.ABREAST, n * (1 + tangents)
     entries = length + len(system.parameters) + NUMBERS + n + PER_GUARD * guards
     shapes = {
+        "counters": (1,),
         "powers": (codes.HIGHEST_ORDER + ROWS_OF_END + guards, max(columns, n + 2) * width),
         "lanes": (len(system.modes), entries * width),
         "weights": (length * width,),

@@ -76,6 +76,7 @@ def take_ashore(sea, task, row):
         if holds_roots(model, mode):
             work.series[order + 1, column] = powers[order + 1, column * ABREAST + row]
     run.stage = READY
+    run.distant = 1 if fired == NO_TRANSITION and (sea.distant >> row) & 1 else 0
     if fired != NO_TRANSITION:
         clock = 0 if model.propagator[mode] == DESINGULARISED else -1
         path = Path(work.series, order, clock, t, 1.0, sea.ends[ABREAST + row], False)

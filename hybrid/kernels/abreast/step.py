@@ -94,6 +94,8 @@ APART = 1e-9
 MOST_CORRECTIONS = 16
 AT_ROOT = 4.0 * EPSILON
 LONGEST = 1e100
+# A guard is far from zero if it is so many bands away.
+DISTANT = 1e3
 # Shortest step, in units of the rounding of time.
 FINEST_STEP = 4.0 * EPSILON
 
@@ -341,7 +343,7 @@ def first_crossing(model, method, sea, lane, places, mode, order, h, exact, able
     ``sea.fired`` gets the transitions.
     """
     n, powers, first = model.dimension, sea.powers, model.first_outgoing[mode]
-    earliest, time = in_every_run(2.0), rows_at(lane, places.numbers + T)
+    earliest, time, distant = in_every_run(2.0), rows_at(lane, places.numbers + T), able
     for slot in range(first, model.first_outgoing[mode + 1]):
         if is_twin(model, mode, slot):
             continue
@@ -350,6 +352,7 @@ def first_crossing(model, method, sea, lane, places, mode, order, h, exact, able
         start, side = entry_at(powers, 0, column), rows_at(lane, places.guards + 3 * (slot - first))
         known = rows_at(lane, places.guards + 3 * (slot - first) + 1) > 0.5
         band = band_of(model, method, sea, time, mode, slot - first, order, size, h, exact)
+        distant = both(distant, value * side > DISTANT * band)
         keeps = without(start * side > size - value * side + 2.0 * band, known)
         asked = without(able, keeps)
         if bits_of(asked) == 0:
@@ -375,6 +378,7 @@ def first_crossing(model, method, sea, lane, places, mode, order, h, exact, able
                 if (bits >> row) & 1:
                     sea.fired[row] = downwards if (falling >> row) & 1 else upwards
         able = both(able, either(keeps, either(none, one)))
+    sea.distant = bits_of(distant)
     return earliest, able
 
 
@@ -486,7 +490,7 @@ def step_abreast(model, method, sea, lane, places, mode, tangents, asked):
         h = smaller(h, LONGEST)
     for row in range(sea.fired.shape[0]):
         sea.fired[row] = NO_TRANSITION
-    event = without(asked, asked)
+    event, sea.distant = without(asked, asked), bits_of(asked)
     if guards > 0:
         earliest, able = first_crossing(model, method, sea, lane, places, mode, order, h, exact, able)
         event = earliest <= 1.0

@@ -212,7 +212,7 @@ def move(model, run, transition, target, x_plus):
     run.stay[run.mode], run.since_entry = run.since_entry, 0.0
     run.previous_mode = run.mode
     run.mode = target
-    run.stage, run.clear = ENTERING, 0
+    run.stage, run.clear, run.distant = ENTERING, 0, 0
     remember_visit(model, run)
 
 

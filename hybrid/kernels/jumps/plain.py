@@ -9,12 +9,11 @@ import math
 
 from numba import njit
 
+from hybrid.kernels.arithmetic.slopes import change_of_rate
 from hybrid.kernels.arithmetic.tangent import STRAINED, multiply, strain
 from hybrid.kernels.events.guards import (
     LEFT_BEHIND,
     ROUNDING_OF_STATE,
-    carry_rounding,
-    guard_acceleration,
     guard_speed,
     guard_value,
     rounding_band,
@@ -105,6 +104,33 @@ def log_determinant_of(matrix, scratch, n):
 
 
 @njit(**INLINE)
+def acceleration(model, other, mode, t, work):
+    """The acceleration of a guard at ``work.new``: field, gradient and Jacobian in ``work`` are current."""
+    total = 0.0
+    for i in range(model.dimension):
+        if work.gradient[i] != 0.0:
+            bend = work.jacobian[i, model.dimension] + change_of_rate(model, mode, i, work.jacobian, work.field)
+            total += work.gradient[i] * bend
+    if model.affine_guard[other] == 1:
+        return total
+    for i in range(model.dimension):
+        work.state[i] = work.field[i]
+    model.guard_curvature(other, t, work.new, model.parameters, work.state)
+    return total + work.state[0]
+
+
+@njit(**INLINE)
+def carry_sizes(model, run, work):
+    """Carry the sizes by which rounding is judged through a reset; ``work.reset_jacobian`` is current."""
+    for i in range(model.dimension):
+        size = 0.0
+        for j in range(model.dimension):
+            size += abs(work.reset_jacobian[i, j]) * work.error[j]
+        if size < math.inf:
+            run.scale[i] = max(run.scale[i], size)
+
+
+@njit(**INLINE)
 def enters_plainly(model, run, fired, target, work):
     """Whether the state ``work.new`` is clear of all guards of a mode but of the surface just crossed.
 
@@ -127,7 +153,7 @@ def enters_plainly(model, run, fired, target, work):
             for i in range(n):
                 work.field[i] = work.field_after[i]
             drift = speed_rounding(model, run, other, target, t, work.new, work)
-            bend = guard_acceleration_of(model, run, other, target, t, work)
+            bend = acceleration(model, other, target, t, work)
             steady = abs(bend) * band <= CHANGE * speed * speed
             if not (steady and -direction * speed > CLEAR * drift and abs(speed) < math.inf):
                 return False
@@ -135,12 +161,6 @@ def enters_plainly(model, run, fired, target, work):
         elif not -direction * value > CLEAR * band:
             return False
     return True
-
-
-@njit(**INLINE)
-def guard_acceleration_of(model, run, other, mode, t, work):
-    """The acceleration of a guard at ``work.new``; ``work.field``, ``gradient`` and ``jacobian`` are current."""
-    return guard_acceleration(model, run, other, mode, t, work.new, work)
 
 
 @exported(TRUTH, Task, INTEGER)
@@ -180,7 +200,9 @@ def jump_plainly(task, fired):
     for i in range(n):
         work.error[i] = run.scale[i]
     if mode != target:
-        carry_rounding(model, run, fired, t, run.y, work.new, work.reset_jacobian, work.state)
+        if tangents == 0:
+            model.reset_jacobian(fired, t, run.y, parameters, work.reset_jacobian)
+        carry_sizes(model, run, work)
     for i in range(n):
         run.scale[i] = max(run.scale[i], abs(work.new[i]))
     if not enters_plainly(model, run, fired, target, work):

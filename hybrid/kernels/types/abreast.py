@@ -7,7 +7,7 @@ from hybrid.kernels.types.structure import Structure
 SERIES_ABREAST = function(None, INTEGER, VECTOR, VECTOR, VECTOR, INTEGER, MATRIX)
 
 
-class Abreast(Structure):
+class Abreast(Structure, counters=("distant",)):
     """What a step of ``W`` runs abreast needs; an entry of a vector or matrix has one number of each run.
 
     ``series`` computes the series of a mode in ``powers (order + 3 + guards, columns)``, ``able (modes,)`` is
@@ -15,9 +15,10 @@ class Abreast(Structure):
     of a mode each. ``lanes (modes, entries)`` is where the runs aboard are, at the start of their next step
     (``lanes``). ``weights (n (1 + k),)``, ``polynomial`` and ``moved`` are scratch. A step leaves ``ends
     (2,)``: the time and the length that it took; and by run, in ``fired (W,)``, the transition whose guard it
-    has reached.
+    has reached; ``distant`` has the bits of the runs that are far from all guards at its end.
     """
 
+    counters: INDICES
     series: SERIES_ABREAST
     able: INDICES
     tangent_start: INTEGER

@@ -252,6 +252,7 @@ COUNTERS = (
     "turned",
     "turned_to",
     "clear",
+    "distant",
 )
 NUMBERS = (
     "phase",
@@ -306,6 +307,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     - ``turned``: jumps at ticks that changed which transition of their clock may fire, last to ``turned_to``.
     - ``clear``: 1 if the last jump has left the state clear of all guards but its own, with the sides of all in
       ``rehearsal``: first the side of each, then whether it is zero.
+    - ``distant``: 1 if the last step has proved that every guard of the mode is far from zero at its end.
     - ``horizon``: how long the run takes, as far as it is known at its start; 0 if it is not.
     - ``longest_step``: the longest step in time so far; ``lateness``: the largest change that the rounding of
       the time made in a step or jump, in tolerances.
