@@ -38,8 +38,6 @@ def means_together(estimates: Sequence[Estimate], transient: int, intervals: int
     """``Estimate.run`` for many runs of one plan; an error stands in the place of its run."""
     first = estimates[0].trajectory
     shared = together(first.compiled, first.plan, first.tangents)
-    if shared is None:
-        return [result_of(partial(each.run, transient, intervals, False, silent())) for each in estimates]
     found: list[Any] = [None] * len(estimates)
     work = [each.rounds(transient, intervals, False) for each in estimates]
     rooms = min(INTERVALS_AT_ONCE, max(transient, intervals))

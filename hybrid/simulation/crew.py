@@ -13,7 +13,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from hybrid.compiler.cache.loader import load_kernels
+from hybrid.compiler.cache.loader import Absent, load_kernels
 from hybrid.compiler.compiled import CompiledSystem
 from hybrid.compiler.parts import ABREAST_SERIES, ABREAST_TANGENT_SERIES
 from hybrid.compiler.statements.code import LoweringError
@@ -65,18 +65,16 @@ class Together:
     layout: Layout
 
 
-def together(compiled: CompiledSystem, plan: Any, tangents: int) -> Together | None:
-    """What the crews of a plan have in common; None if no mode takes steps abreast."""
+def together(compiled: CompiledSystem, plan: Any, tangents: int) -> Together:
+    """What the crews of a plan have in common."""
     if not plan.together:
         plan.together.append(_together(compiled, plan, tangents))
-    found: Together | None = plan.together[0]
+    found: Together = plan.together[0]
     return found
 
 
-def _together(compiled: CompiledSystem, plan: Any, tangents: int) -> Together | None:
+def _together(compiled: CompiledSystem, plan: Any, tangents: int) -> Together:
     system, emitted = compiled.system, compiled.emitted
-    if system.growth is not None:
-        return None
     able = [
         each.abreast is not None
         and kind == each.kind
@@ -84,12 +82,14 @@ def _together(compiled: CompiledSystem, plan: Any, tangents: int) -> Together | 
         and not (tangents > 0 and emitted.abrupt[mode])
         for mode, (each, kind) in enumerate(zip(emitted.propagators, plan.model.propagator, strict=True))
     ]
-    if not any(able):
-        return None
-    try:
-        [series] = compiled.functions(ABREAST_TANGENT_SERIES if tangents else ABREAST_SERIES).values()
-    except LoweringError:
-        return None
+    series: Any = Absent()
+    # The cases of a system that grows are compiled one by one, as a run needs them.
+    able = [each and system.growth is None for each in able]
+    if any(able):
+        try:
+            [series] = compiled.functions(ABREAST_TANGENT_SERIES if tangents else ABREAST_SERIES).values()
+        except LoweringError:
+            able = [False] * len(able)
     strides = [0 if each.abreast is None else each.abreast.tangent_columns for each in emitted.propagators]
     sources = [each.source for each in system.transitions]
     guards = max(sources.count(name) for name in system.mode_names)
@@ -137,6 +137,13 @@ def crew_layout(runs: int, modes: int) -> Layout:
         "aboard": (modes, codes.ABREAST),
     }
     return Layout(Memory, shapes)
+
+
+def berths(plan: Any, model: Any, count: int, origin: np.ndarray, t0: float, horizon: float = 0.0) -> Any:
+    """Memories of a plan, each at the start of a run from ``origin``; the phase there."""
+    found = [plan.memory() for _ in range(count)]
+    phases = [each.begin(model, origin, None, t0, horizon) for each in found]
+    return found, phases[0]
 
 
 class Crew:

@@ -118,13 +118,17 @@ def put_tangents(y: np.ndarray, n: int, matrix: np.ndarray) -> None:
     rows[:, : len(matrix)], rows[:, len(matrix) :] = matrix.T, 0.0
 
 
-def starts_of(memory: Memory, origins: np.ndarray, **others: Any) -> Any:
-    """The ``Starts`` of runs in a memory at the start of a run, with the other fields that they need."""
+def starts_of(memory: Memory, origins: np.ndarray, queue: np.ndarray, **others: Any) -> Any:
+    """The ``Starts`` of runs in a memory at the start of a run, with the other fields that they need.
+
+    ``queue (1,)`` is shared by all memories of these runs.
+    """
     plan = memory.plan
     run_words, work_words = plan.run_layout.words(memory.run), plan.work_layout.words(memory.work)
     return Starts(
-        counters=np.zeros(2, dtype=np.int64),
+        counters=np.full(1, -1, dtype=np.int64),
         origins=origins,
+        queue=queue,
         verdicts=np.zeros(len(plan.model.target), dtype=np.int64),
         run_words=run_words,
         fresh_run=run_words.copy(),

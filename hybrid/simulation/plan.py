@@ -15,7 +15,6 @@ from hybrid.compiler.compiled import CompiledSystem
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
 from hybrid.kernels.types.layout import Attempts, Method, Parts, Task
-from hybrid.kernels.types.structure import MOST_SPARES
 from hybrid.simulation.memory import MOST_LAYOUTS, Memory, no_record, run_layout, work_layout
 from hybrid.solvers import Solver, Taylor
 from hybrid.solvers.tableau import SERIES_NODES, SERIES_WEIGHTS
@@ -23,6 +22,8 @@ from hybrid.status import StatusCode
 from hybrid.system.graph import ticks_of
 
 DEFAULT_SOLVER = Taylor()
+# Memories that are kept for later: those of a crew for each of a few threads.
+MOST_MEMORIES = 256
 
 
 def check_solver(solver: object) -> Solver:
@@ -69,7 +70,7 @@ class Plan:
 
     def take_back(self, memory: Memory) -> None:
         """Keep the memory of a run that nobody can advance or look at any more."""
-        if len(self.spares) < MOST_SPARES:
+        if len(self.spares) < MOST_MEMORIES:
             self.spares.append(memory)
 
     @property

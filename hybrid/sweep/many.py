@@ -16,8 +16,9 @@ from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import progress_bar
 from hybrid.errors import ArgumentError, HybridError
 from hybrid.kernels.types import codes
+from hybrid.kernels.types.starts import Sampled
+from hybrid.simulation.crew import TOGETHER, Crew, berths, together
 from hybrid.simulation.ending import status_of
-from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.memory import starts_of
 from hybrid.simulation.periods import check_time, split_time
@@ -56,8 +57,8 @@ def simulate_many(
 ) -> xarray.Dataset:
     """Run a system from many starts: where each run ends, and its state at the samples.
 
-    The ends are those of :func:`hybrid.simulate` to the last bit, except with ``samples``, where steps end at
-    the samples. A run that fails does so alone. Ctrl-C ends the call, not the program: runs that are not
+    The ends are those of :func:`hybrid.simulate`, up to rounding: runs take their steps together, and what one
+    finds depends on no other. With ``samples``, steps end at the samples. A run that fails does so alone. Ctrl-C ends the call, not the program: runs that are not
     complete have the status ``NOT_RUN``.
 
     Parameters
@@ -245,47 +246,55 @@ class _Runs:
         self.phases = np.array([phase for _, phase in places])
 
     def run(self, block: range) -> None:
-        """Run from these starts, in a memory of this thread."""
+        """Run from these starts, in memories of this thread."""
         if CTRL_C.is_set():
             return
         plan, found, part = self.plan, self.found, slice(block.start, block.stop)
         origins, states = found.origins[part], found.states[part]
-        memory = plan.memory()
-        t0, t1 = self.t_span
-        phase0 = memory.begin(self.model, origins[0], None, t0, t1 - t0)
-        solver = self.options["solver"]
-        trajectory = Trajectory(self.compiled, plan, self.model, memory, 0, solver.max_steps, phase0)
         places = np.zeros((len(block), 3), dtype=np.int64)
-        limits = {"max_steps": solver.max_steps, "max_jumps": self.max_jumps}
-        starts = starts_of(memory, origins, named=self.named, found=places, **limits)
-        changed = starts.run_words, starts.work_words, places, starts.verdicts, starts.counters
-        kernel = load_kernels("hybrid.kernels.events.many").many_runs
-        advance, task = load_kernels().advance, trajectory.task(trajectory.no_record())
-        told: list[int] = []
-        bursts = Bursts([trajectory])
-        while starts.reached < len(block):
-            bursts.most()
-
-            def more(parts: Any, budget: int = bursts.steps) -> int:
-                return kernel(advance, parts, task, starts, self.cycles, self.phases, budget, states)
-
-            code = plan.called(more, *changed)
-            i, resumed = starts.reached, starts.resumed
-            if code == codes.REFUSED:
-                # Python finds a mode where a guard of another one is not finite, takes steps in time where
-                # series hold the root of a guard that the start lies beyond, or says why no mode is allowed.
-                self.one_by_one.run(range(block.start + i, block.start + i + 1))
-            elif not resumed and i < len(block):
-                self._tell(block.start + i, trajectory, code, starts.verdicts)
-            if not resumed and i < len(block):
-                told.append(i)
-            starts.reached = i if resumed else i + 1
-            # Only calls that used up their steps say how many steps fit into a burst.
-            if bursts.judged(codes.MAX_STEPS) == StatusCode.INTERRUPTED if resumed else CTRL_C.is_set():
+        (t0, t1), count = self.t_span, min(len(block), TOGETHER)
+        memories, phase0 = berths(plan, self.model, count, origins[0], t0, t1 - t0)
+        queue = np.zeros(1, dtype=np.int64)
+        jobs = [
+            Sampled(
+                counters=np.zeros(1, dtype=np.int64),
+                starts=starts_of(each, origins, queue, named=self.named, found=places),
+                cycles=self.cycles,
+                phases=self.phases,
+                states=states,
+            )
+            for each in memories
+        ]
+        tasks = [each.task(self.model, orthonormal=False) for each in memories]
+        crew = Crew(together(self.compiled, plan, 0), plan, tasks, jobs)
+        most = self.options["solver"].max_steps
+        crew.memory.max_steps[:], crew.memory.max_jumps[:] = most, self.max_jumps
+        onward = load_kernels("hybrid.kernels.events.many").sampled
+        is_told = np.zeros(len(block), dtype=bool)
+        under_way = range(count)
+        while under_way:
+            crew.memory.codes[:] = codes.DONE
+            crew.memory.codes[list(under_way)] = codes.GO_ON
+            finished = crew.go(onward, CTRL_C)
+            now = [int(each.starts.now) for each in jobs]
+            if not finished:
+                is_told[[i for i, code in zip(now, crew.memory.codes, strict=True) if code == codes.GO_ON]] = True
                 break
-        done = np.zeros(len(block), dtype=bool)
-        done[: starts.reached] = True
-        done[told] = False
+            # A run of which there is something to tell waits until that has been told.
+            under_way = [row for row in under_way if now[row] >= 0]
+            for row in under_way:
+                i, code = now[row], int(crew.memory.codes[row])
+                is_told[i] = True
+                if code == codes.REFUSED:
+                    # Python finds a mode where a guard of another one is not finite, takes steps in time
+                    # where series hold the root of a guard that the start lies beyond, or says why no mode
+                    # is allowed.
+                    self.one_by_one.run(range(block.start + i, block.start + i + 1))
+                    continue
+                trajectory = Trajectory(self.compiled, plan, self.model, memories[row], 0, most, phase0)
+                self._tell(block.start + i, trajectory, code, jobs[row].starts.verdicts)
+        done = np.arange(len(block)) < queue[0]
+        done &= ~is_told
         rows = block.start + np.flatnonzero(done)
         if rows.size:
             plain = Status(StatusCode.SUCCESS, "Reached the end.")
@@ -293,6 +302,8 @@ class _Runs:
             found.t_end[rows] = found.t1
             found.mode[rows] = np.array(self.system.mode_names, dtype=object)[places[done, 0]]
             found.jumps[rows] = places[done, 1]
+        for each in memories:
+            plan.take_back(each)
 
     def _tell(self, i: int, trajectory: Trajectory, code: int, verdicts: np.ndarray) -> None:
         """Keep the end of a run of which there is something to tell."""

@@ -31,6 +31,8 @@ from hybrid.kernels.types.numba_door.addressed import structure_at
 from hybrid.kernels.types.options import INLINE, KERNEL, exported
 
 task_at = structure_at(Task)
+# Steps that a run takes at once in a mode in which none are taken abreast.
+ALONE = 16
 
 
 @njit(**KERNEL)
@@ -124,7 +126,8 @@ def muster(parts, sea, crew, onward, r):
 def step_alone(advance, parts, sea, crew, onward, r):
     """One step of a run that is not taken abreast, with what follows at its end."""
     task = task_at(crew.tasks[r])
-    most = min(crew.max_steps[r], task.run.steps + 1)
+    more = 1 if sea.able[task.run.mode] == 1 else ALONE
+    most = min(crew.max_steps[r], task.run.steps + more)
     crew.alone += 1
     crew.refused[r] = 0
     code = advance(parts, task, crew.cycles[r], crew.phases[r], most, crew.max_jumps[r])
@@ -167,6 +170,12 @@ def fullest(crew):
     return found
 
 
+@njit(**INLINE)
+def beyond(time, room):
+    """How much longer a time is than a room; both may be infinite."""
+    return 0.0 if time == room else time - room
+
+
 @njit(**KERNEL)
 def go_ashore(parts, sea, crew, mode, row, took, went):
     """Let a run leave its lane: at the end of a step that it took, or where it was at the start.
@@ -178,7 +187,6 @@ def go_ashore(parts, sea, crew, mode, row, took, went):
     task = task_at(crew.tasks[r])
     places = places_in(task.model, task.tangents, crew.parameters, mode)
     left = lane[(places.numbers + ROOM) * ABREAST + row]
-    passed = crew.rooms[r, 2] - left
     leave(lane, places, task, row)
     if not took:
         if (went >> row) & 1 and task.tangents > 0 and task.orthonormal != 0:
@@ -188,9 +196,10 @@ def go_ashore(parts, sea, crew, mode, row, took, went):
     fired = sea.fired[row]
     alone = fired != NO_TRANSITION and is_alone(task.model, mode, fired)
     span = take_ashore(sea, task, row)
-    room = Room(
-        crew.rooms[r, 0] - passed, crew.rooms[r, 1] - passed, left, crew.rooms[r, 3], crew.clocks[r]
-    )
+    # What is left of a time that ends with the room ends with it to the last bit.
+    remains = left + beyond(crew.rooms[r, 0], crew.rooms[r, 2])
+    until = left + beyond(crew.rooms[r, 1], crew.rooms[r, 2])
+    room = Room(remains, until, left, crew.rooms[r, 3], crew.clocks[r])
     return r, complete(parts, task, room, span, crew.cycles[r], crew.phases[r], alone)
 
 

@@ -1,25 +1,28 @@
-"""Runs from many starts, one after another, without leaving the compiled code."""
+"""Runs from many starts, without leaving the compiled code."""
 
 from numba import njit
 
 from hybrid.kernels.events.initial_mode import verdicts_on
 from hybrid.kernels.types import notes
+from hybrid.kernels.types.abreast import Crew
 from hybrid.kernels.types.codes import (
     BEYOND,
     DESINGULARISED,
     DONE,
     GO_ON,
-    MAX_STEPS,
     NO_MODE,
     NO_OBJECTION,
     NO_TRANSITION,
     REFUSED,
     ROOTED,
 )
-from hybrid.kernels.types.kinds import CUBE, INDICES, INTEGER, VECTOR
-from hybrid.kernels.types.layout import ADVANCE, Parts, Task
+from hybrid.kernels.types.kinds import INTEGER
+from hybrid.kernels.types.layout import Parts, Task
+from hybrid.kernels.types.numba_door.addressed import structure_at
 from hybrid.kernels.types.options import KERNEL, exported
-from hybrid.kernels.types.starts import Starts
+from hybrid.kernels.types.starts import Sampled
+
+sampled_at = structure_at(Sampled)
 
 
 @njit(**KERNEL)
@@ -68,54 +71,57 @@ def mode_of_start(parts, task, named, verdicts):
 
 
 @njit(**KERNEL)
-def mode_of_fresh_run(parts, task, starts, i):
-    """``mode_of_start`` of the run from start ``i``, whose memory is made fresh."""
-    run = task.run
+def begin_next(parts, task, starts):
+    """Begin the run of the next start in fresh memory; the mode that it starts in, as ``mode_of_start``.
+
+    Without a next start, ``starts.now`` is -1.
+    """
+    run, i = task.run, starts.queue[0]
+    if i >= starts.origins.shape[0]:
+        starts.now = -1
+        return NO_MODE
+    starts.now = i
+    starts.queue[0] = i + 1
     set_words(starts.run_words, starts.fresh_run)
     set_words(starts.work_words, starts.fresh_work)
     for c in range(task.model.dimension):
         run.y[c] = starts.origins[i, c]
         run.scale[c] = abs(starts.origins[i, c])
-    return mode_of_start(parts, task, starts.named, starts.verdicts)
+    run.mode = mode_of_start(parts, task, starts.named, starts.verdicts)
+    return run.mode
 
 
 is_plain = njit(**KERNEL)(notes.is_plain)
 
 
-@exported(INTEGER, ADVANCE, Parts, Task, Starts, INDICES, VECTOR, INTEGER, CUBE)
-def many_runs(advance, parts, task, starts, cycles, phases, budget, states):
-    """The states ``(N, S, n)`` of runs from many starts at ``S`` times, the last one their end.
+@exported(INTEGER, Parts, Task, Crew, INTEGER, INTEGER)
+def sampled(parts, task, crew, r, code):
+    """What a run does next whose states are kept at given times (``ONWARD``).
 
-    ``starts.found (N, 3)`` gets the mode, the number of jumps and the number of states reached. Stops at the
-    first run that is not complete, or of which there is something to tell. Returns the code of that run;
-    REFUSED if it cannot start here, GO_ON if the ``budget`` of steps was used up, after which the next call
-    resumes the run.
+    Of a run that is not complete, or of which there is something to tell, the code is returned; REFUSED if
+    it cannot start here. At the next call its memory takes the next start.
     """
-    run, found = task.run, starts.found
-    for i in range(starts.reached, states.shape[0]):
-        starts.reached = i
-        if starts.resumed == 0:
-            found[i, 2] = 0
-            mode = mode_of_fresh_run(parts, task, starts, i)
-            if mode == NO_MODE:
-                return REFUSED
-            run.mode = mode
-        starts.resumed = 0
-        for s in range(found[i, 2], cycles.shape[0]):
-            before = run.steps
-            most = min(starts.max_steps, before + budget)
-            code = advance(parts, task, cycles[s], phases[s], most, starts.max_jumps)
-            budget -= run.steps - before
-            if code == MAX_STEPS and most < starts.max_steps:
-                starts.resumed = 1
-                return GO_ON
-            if code != DONE:
-                return code
-            for c in range(task.model.dimension):
-                states[i, s, c] = run.y[c]
-            found[i, 2] = s + 1
-        found[i, 0], found[i, 1] = run.mode, run.jumps
-        if not is_plain(task.model, run, guards_beyond(starts.named, starts.verdicts)):
+    job, run = sampled_at(crew.jobs[r]), task.run
+    starts, last = job.starts, job.cycles.shape[0] - 1
+    i, s = starts.now, job.sample
+    if code not in (DONE, GO_ON):
+        return code
+    if code == DONE:
+        for c in range(task.model.dimension):
+            job.states[i, s, c] = run.y[c]
+        s += 1
+        starts.found[i, 2] = s
+        if s > last:
+            starts.found[i, 0], starts.found[i, 1] = run.mode, run.jumps
+            if not is_plain(task.model, run, guards_beyond(starts.named, starts.verdicts)):
+                return DONE
+    if code == GO_ON or s > last:
+        s = 0
+        mode = begin_next(parts, task, starts)
+        if starts.now < 0:
             return DONE
-    starts.reached = states.shape[0]
-    return DONE
+        if mode == NO_MODE:
+            return REFUSED
+    job.sample = s
+    crew.cycles[r], crew.phases[r] = job.cycles[s], job.phases[s]
+    return GO_ON

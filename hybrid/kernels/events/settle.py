@@ -2,8 +2,9 @@
 
 from numba import njit
 
-from hybrid.kernels.events.many import guards_beyond, mode_of_fresh_run
-from hybrid.kernels.types.attractors import Known, Progress, Section
+from hybrid.kernels.events.many import begin_next, guards_beyond
+from hybrid.kernels.types.abreast import Crew
+from hybrid.kernels.types.attractors import Progress, Section
 from hybrid.kernels.types.codes import (
     DONE,
     GO_ON,
@@ -16,9 +17,11 @@ from hybrid.kernels.types.codes import (
 )
 from hybrid.kernels.types.kinds import INDEX_MATRIX, INTEGER, MATRIX
 from hybrid.kernels.types.layout import ADVANCE, Parts, Task
+from hybrid.kernels.types.numba_door.addressed import structure_at
 from hybrid.kernels.types.options import KERNEL, exported
-from hybrid.kernels.types.starts import Starts
+from hybrid.kernels.types.starts import Settling
 
+settling_at = structure_at(Settling)
 INFINITE = float("inf")
 # Columns of what is found: the attractor, the number of points, the code of the run, the mode at the start.
 OWNER, POINTS, CODE, MODE = range(4)
@@ -55,18 +58,24 @@ def near(known, y, mode):
 
 
 @njit(**KERNEL)
+def go_to_next(section, progress, period):
+    """Let the time of the next point be that of ``progress``."""
+    if section.interval == 0.0:
+        progress.cycle += 1
+        return
+    progress.phase += section.interval
+    while period > 0.0 and progress.phase >= period:
+        progress.phase -= period
+        progress.cycle += 1
+
+
+@njit(**KERNEL)
 def next_point(advance, parts, task, section, progress, max_steps):
     """Advance to the next point of the section; DONE there, or the code of the run if it ends before."""
     run, period = task.run, task.model.period
     if section.markers == 0:
         if progress.under_way == 0:
-            if section.interval > 0.0:
-                progress.phase += section.interval
-                while period > 0.0 and progress.phase >= period:
-                    progress.phase -= period
-                    progress.cycle += 1
-            else:
-                progress.cycle += 1
+            go_to_next(section, progress, period)
             progress.under_way = 1
         code = advance(parts, task, progress.cycle, progress.phase, max_steps, UNLIMITED)
         if code == DONE:
@@ -98,75 +107,76 @@ def violates_all(model, verdicts):
 
 
 @njit(**KERNEL)
-def begin(parts, task, starts, section, progress, i):
-    """Begin the run from start ``i``; DONE, or REFUSED if it has no mode, or GO_ON if it has several."""
-    run, found, named = task.run, starts.found, starts.named
-    mode = mode_of_fresh_run(parts, task, starts, i)
-    progress.cycle, progress.phase = run.cycle, section.phase
-    progress.under_way, progress.points, progress.near, progress.streak = 0, 0, NONE, 0
-    if guards_beyond(named, starts.verdicts) > 0:
-        mode = NO_MODE
-    found[i, MODE] = mode
-    if mode != NO_MODE:
-        run.mode = mode
-        return DONE
-    found[i, OWNER], found[i, POINTS], found[i, CODE] = NONE, 0, REFUSED
-    return REFUSED if named != NO_MODE or violates_all(task.model, starts.verdicts) else GO_ON
+def begin(parts, task, job):
+    """Begin the next run that has a mode; DONE without one, and REFUSED if more than one mode allows a start."""
+    run, starts, progress = task.run, job.starts, job.progress
+    found, named = starts.found, starts.named
+    while True:
+        mode = begin_next(parts, task, starts)
+        if starts.now < 0:
+            return DONE
+        progress.cycle, progress.phase = run.cycle, job.section.phase
+        progress.under_way, progress.points, progress.near, progress.streak = 0, 0, NONE, 0
+        if guards_beyond(named, starts.verdicts) > 0:
+            mode = NO_MODE
+        i = starts.now
+        found[i, MODE] = mode
+        if mode != NO_MODE:
+            return GO_ON
+        found[i, OWNER], found[i, POINTS], found[i, CODE] = NONE, 0, REFUSED
+        if not (named != NO_MODE or violates_all(task.model, starts.verdicts)):
+            return REFUSED
 
 
 @njit(**KERNEL)
-def advance_until_decided(advance, parts, task, starts, known, section, progress, budget):
-    """Go on from point to point until the start of a run is decided; the code and the rest of the budget.
-
-    The code is GO_ON if the budget is used up.
-    """
-    run, code = task.run, DONE
-    while code == DONE and progress.streak < section.wanted and progress.points < section.most:
-        before = run.steps
-        most = min(starts.max_steps, before + budget)
-        code = next_point(advance, parts, task, section, progress, most)
-        budget -= run.steps - before
-        if code == MAX_STEPS and most < starts.max_steps:
-            return GO_ON, budget
-        if code == DONE:
-            progress.points += 1
-            owner = near(known, run.y, run.mode)
-            progress.streak = progress.streak + 1 if owner == progress.near and owner != NONE else 1
-            progress.near = owner
-            if owner == NONE:
-                progress.streak = 0
-    return code, budget
+def is_decided(known, section, progress, run):
+    """Take a point of the section; whether no more are wanted."""
+    progress.points += 1
+    owner = near(known, run.y, run.mode)
+    progress.streak = progress.streak + 1 if owner == progress.near and owner != NONE else 1
+    progress.near = owner
+    if owner == NONE:
+        progress.streak = 0
+    return progress.streak >= section.wanted or progress.points >= section.most
 
 
-@exported(INTEGER, ADVANCE, Parts, Task, Starts, Known, Section, Progress, INTEGER)
-def settle(advance, parts, task, starts, known, section, progress, budget):
-    """Run until each start is decided; the rows of ``starts.found (N, 4)`` are described above.
+@exported(INTEGER, Parts, Task, Crew, INTEGER, INTEGER)
+def settle(parts, task, crew, r, code):
+    """What a run does next that settles on an attractor (``ONWARD``); ``starts.found`` is described above.
 
     A run stops at the point that decides its start. Its code is DONE then, and MAX_STEPS where ``most``
     points decide nothing; other codes are those of runs that end. REFUSED, with no mode at the start: it
-    violates the mode that is named, or every mode if none is. Returns DONE after the last start, GO_ON if
-    the ``budget`` of steps was used up, after which the next call resumes the run; REFUSED if more than one
-    mode allows the start that was reached.
+    violates the mode that is named, or every mode if none is. The result is REFUSED if more than one mode
+    allows the start that was reached.
     """
-    found = starts.found
-    for i in range(starts.reached, found.shape[0]):
-        starts.reached = i
-        if starts.resumed == 0:
-            code = begin(parts, task, starts, section, progress, i)
-            if code == GO_ON:
-                return REFUSED
-            if code == REFUSED:
-                continue
-        code, budget = advance_until_decided(advance, parts, task, starts, known, section, progress, budget)
-        starts.resumed = 1 if code == GO_ON else 0
-        if code == GO_ON:
+    job, run = settling_at(crew.jobs[r]), task.run
+    section, progress, starts = job.section, job.progress, job.starts
+    if section.markers > 0 and code == MAX_JUMPS and run.pending >= section.markers:
+        crew.max_jumps[r] = run.jumps + 1
+        return GO_ON
+    if code != GO_ON:
+        arrives = code == DONE or (section.markers > 0 and code == MAX_JUMPS)
+        if not arrives or is_decided(job.known, section, progress, run):
+            found, decided = starts.found[starts.now], arrives and progress.streak >= section.wanted
+            found[OWNER], found[POINTS] = progress.near if decided else NONE, progress.points
+            found[CODE] = code
+            if arrives:
+                found[CODE] = DONE if decided else MAX_STEPS
+            code = GO_ON
+        elif section.markers > 0:
+            crew.max_jumps[r] = run.jumps + 1
             return GO_ON
-        decided = code == DONE and progress.streak >= section.wanted
-        found[i, OWNER] = progress.near if decided else NONE
-        found[i, POINTS] = progress.points
-        found[i, CODE] = MAX_STEPS if code == DONE and not decided else code
-    starts.reached = found.shape[0]
-    return DONE
+    if code == GO_ON:
+        code = begin(parts, task, job)
+        if code != GO_ON:
+            return code
+    if section.markers == 0:
+        go_to_next(section, progress, task.model.period)
+        crew.cycles[r], crew.phases[r] = progress.cycle, progress.phase
+    else:
+        crew.cycles[r], crew.phases[r] = UNLIMITED if task.model.period > 0.0 else 0, INFINITE
+        crew.max_jumps[r] = run.jumps
+    return GO_ON
 
 
 @exported(INTEGER, ADVANCE, Parts, Task, Section, Progress, INTEGER, MATRIX, INDEX_MATRIX)

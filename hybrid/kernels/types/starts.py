@@ -1,20 +1,22 @@
-"""Runs from many starts, one after another in the same memory."""
+"""Runs from many starts: each takes the next one when it is over."""
 
-from hybrid.kernels.types.kinds import INDEX_MATRIX, INDICES, INTEGER, MATRIX
+from hybrid.kernels.types.attractors import Known, Progress, Section
+from hybrid.kernels.types.kinds import CUBE, INDEX_MATRIX, INDICES, INTEGER, MATRIX, VECTOR
 from hybrid.kernels.types.structure import Structure
 
 
-class Starts(Structure, counters=("reached", "resumed")):
-    """The starts ``origins (N, n)`` of runs, and the memory in which they run.
+class Starts(Structure, counters=("now",)):
+    """The starts ``origins (N, n)`` of runs in one memory; several memories share the starts.
 
+    The run under way is from the start ``now``, -1 for none; the next one is in ``queue (1,)``.
     ``run_words`` and ``work_words`` are the memory of run and work, ``fresh_run`` and ``fresh_work`` what
     that holds at the start. All runs start in the mode ``named``, or in the one that allows the start if that
     is NO_MODE; ``verdicts`` are what each guard says of the last start. ``found (N, ...)`` are rows of what
-    is found. The runs up to ``reached`` are complete; that one is to be ``resumed`` if it has begun. Each run
-    may take ``max_steps`` and ``max_jumps``.
+    is found.
     """
 
     counters: INDICES
+    queue: INDICES
     origins: MATRIX
     named: INTEGER
     verdicts: INDICES
@@ -23,5 +25,25 @@ class Starts(Structure, counters=("reached", "resumed")):
     work_words: INDICES
     fresh_work: INDICES
     found: INDEX_MATRIX
-    max_steps: INTEGER
-    max_jumps: INTEGER
+
+
+class Sampled(Structure, counters=("sample",)):
+    """Runs whose states ``(N, S, n)`` are kept at ``S`` times, the last one their end; the next is ``sample``.
+
+    ``starts.found (N, 3)`` gets the mode, the number of jumps and the number of states reached.
+    """
+
+    counters: INDICES
+    starts: Starts
+    cycles: INDICES
+    phases: VECTOR
+    states: CUBE
+
+
+class Settling(Structure):
+    """Runs that settle on attractors; ``starts.found (N, 4)`` are described in ``kernels.runs.settle``."""
+
+    starts: Starts
+    known: Known
+    section: Section
+    progress: Progress

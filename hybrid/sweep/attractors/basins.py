@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -171,12 +171,21 @@ class Lines:
 
     def __call__(self, point: Mapping[str, float]) -> dict[str, np.ndarray]:
         """What is found of each start of the line."""
-        [(name, value)] = point.items()
-        column = self.setup.system.state_names.index(name)
+        [found] = self.together([point], [None])
+        return found
+
+    def together(
+        self, points: Sequence[Mapping[str, float]], _: Sequence[None]
+    ) -> list[dict[str, np.ndarray]]:
+        """What is found of each start of several lines; runs take their steps together."""
         length = len(self.grid.origins) // self.grid.shape[0]
-        origins = self.grid.origins[:length].copy()
-        origins[:, column] = value
-        return {"rows": self.rows(origins).astype(float)}
+        origins = np.tile(self.grid.origins[:length], (len(points), 1))
+        for i, point in enumerate(points):
+            [(name, value)] = point.items()
+            column = self.setup.system.state_names.index(name)
+            origins[i * length : (i + 1) * length, column] = value
+        rows = self.rows(origins).astype(float)
+        return [{"rows": each} for each in rows.reshape(len(points), length, -1)]
 
     def rows(self, origins: np.ndarray) -> np.ndarray:
         """What is found of starts."""

@@ -15,10 +15,11 @@ from hybrid.display.progress import Progress, silent
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import attractors as kernel_types
 from hybrid.kernels.types import codes
+from hybrid.kernels.types.starts import Settling
+from hybrid.simulation.crew import TOGETHER, Crew, berths, together
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.memory import starts_of
 from hybrid.simulation.plan import plan_of
-from hybrid.simulation.trajectory import Trajectory
 from hybrid.status import StatusCode
 from hybrid.sweep.attractors.setup import Setup
 from hybrid.sweep.blocks import run_in_blocks
@@ -72,26 +73,37 @@ class Runs:
     def _block(self, origins: np.ndarray, known: Any, most: int, found: np.ndarray) -> None:
         if not len(origins) or CTRL_C.is_set():
             return
-        plan, solver = self.plan, self.setup.solver
-        memory = plan.memory()
-        phase0 = memory.begin(self.model, origins[0], None, self.setup.t0)
-        trajectory = Trajectory(self.compiled, plan, self.model, memory, 0, solver.max_steps, phase0)
-        limits = {"max_steps": solver.max_steps, "max_jumps": codes.UNLIMITED}
-        starts = starts_of(memory, origins, named=self.named, found=found, **limits)
-        task = trajectory.task(trajectory.no_record())
-        section, progress = self.section(phase0, most), self.progress(trajectory)
-        kernel, advance = load_kernels("hybrid.kernels.events.settle").settle, load_kernels().advance
-        bursts = Bursts([trajectory])
-        while starts.reached < len(origins):
-            bursts.most()
-            code = kernel(advance, self.parts, task, starts, known, section, progress, bursts.steps)
-            first = starts.reached
-            if code == codes.REFUSED:
-                self._one(origins[first : first + 1], known, most, found[first : first + 1])
-                starts.reached = first + 1
-            if starts.resumed and bursts.judged(codes.MAX_STEPS) == StatusCode.INTERRUPTED:
-                found[first:, CODE], found[first:, OWNER] = StatusCode.NOT_RUN, NONE
+        plan, count = self.plan, min(len(origins), TOGETHER)
+        memories, phase0 = berths(plan, self.model, count, origins[0], self.setup.t0)
+        section, queue = self.section(phase0, most), np.zeros(1, dtype=np.int64)
+        jobs = [
+            Settling(
+                starts=starts_of(each, origins, queue, named=self.named, found=found),
+                known=known,
+                section=section,
+                progress=self.progress(int(each.run.cycle), phase0),
+            )
+            for each in memories
+        ]
+        tasks = [each.task(self.model, orthonormal=False) for each in memories]
+        crew = Crew(together(self.compiled, plan, 0), plan, tasks, jobs)
+        crew.memory.max_steps[:] = self.setup.solver.max_steps
+        onward = load_kernels("hybrid.kernels.events.settle").settle
+        under_way = range(count)
+        while under_way:
+            crew.memory.codes[:] = codes.DONE
+            crew.memory.codes[list(under_way)] = codes.GO_ON
+            if not crew.go(onward, CTRL_C):
+                # A run that is under way is not complete, nor is one that has not begun.
+                over = found[:, CODE] != StatusCode.NOT_RUN
+                found[~over, OWNER] = NONE
                 return
+            under_way = [row for row in under_way if jobs[row].starts.now >= 0]
+            for row in under_way:
+                first = int(jobs[row].starts.now)
+                self._one(origins[first : first + 1], known, most, found[first : first + 1])
+        for each in memories:
+            plan.take_back(each)
 
     def _one(self, origin: np.ndarray, known: Any, most: int, found: np.ndarray) -> None:
         """A start whose mode Python has to find; an ArgumentError if more than one mode allows the start."""
@@ -117,10 +129,10 @@ class Runs:
             most=most,
         )
 
-    def progress(self, trajectory: Trajectory) -> Any:
+    def progress(self, cycle: int, phase: float) -> Any:
         """The progress of a run at its start."""
-        counters = np.array([trajectory.run.cycle, 0, 0, NONE, 0], dtype=np.int64)
-        return kernel_types.Progress(counters=counters, numbers=np.array([trajectory.phase0]))
+        counters = np.array([cycle, 0, 0, NONE, 0], dtype=np.int64)
+        return kernel_types.Progress(counters=counters, numbers=np.array([phase]))
 
 
 class Points:
@@ -131,7 +143,7 @@ class Points:
         self.trajectory = setup.begin(x0, mode, marked=True)
         self.task = self.trajectory.task(self.trajectory.no_record())
         self.section = self.runs.section(self.trajectory.phase0, 0)
-        self.progress = self.runs.progress(self.trajectory)
+        self.progress = self.runs.progress(int(self.trajectory.run.cycle), self.trajectory.phase0)
         self.code = codes.DONE
 
     def more(self, count: int) -> tuple[np.ndarray, np.ndarray]:
