@@ -51,7 +51,7 @@ class Watched:
 
     def holds(self) -> bool:
         """Whether all values are still what they were. This takes some microseconds, longer for tables."""
-        # Loops, as every run asks: over an empty list they cost nothing. Most values are the very same object.
+        # Loops, as every run asks: over an empty list they cost nothing. Most values are the same object.
         for cell, _, value in self._cells:
             found = _content(cell)
             if found is not value and not _same(found, value):
@@ -67,10 +67,7 @@ class Watched:
         for array, content in self._arrays:
             if array.tobytes() != content:
                 return False
-        for held, items in self._lists:
-            if not _same_items(_items(held), items):
-                return False
-        return True
+        return not self._lists or all(_same_items(_items(held), items) for held, items in self._lists)
 
     def joined(self, other: Watched) -> Watched:
         """These values and others."""
