@@ -97,7 +97,7 @@ class HybridArc:
 
     @classmethod
     def of_run(cls, points: Steps | Samples, **known: Any) -> HybridArc:
-        """The arc of a run from what it kept: fields in ``MADE_LATER`` are made of this, ``known`` are the rest."""
+        """The arc of a run from what it kept: all fields that are not ``known`` are made of this."""
         arc = object.__new__(cls)
         arc.__dict__.update(known, _sensitivities=None, _made_of=points)
         return arc

@@ -96,48 +96,45 @@ class Steps:
         """The smooth pieces."""
         return Pieces.of_rows(self.steps, self.blocks, self.course.period)
 
-    @property
+    @cached_property
     def t(self) -> np.ndarray:
         """Times ``(N,)``."""
-        return self._columns[0]
-
-    @property
-    def j(self) -> np.ndarray:
-        """Jump counts ``(N,)``."""
-        return self._columns[1]
-
-    @property
-    def x(self) -> np.ndarray:
-        """States ``(N, n)``."""
-        return self._columns[2]
-
-    @property
-    def mode(self) -> np.ndarray:
-        """Indices of the modes ``(N,)``."""
-        return self._columns[3]
+        return self._in_order(self.pieces.t, self.jumps.t, self.course.end.t)
 
     @cached_property
-    def _columns(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Times, jump counts, states and modes, in order."""
-        pieces, jumps, end, system = self.pieces, self.jumps, self.course.end, self.course.system
-        count = np.arange(len(jumps))
-        # The state before a jump follows the starts of all steps with as many jumps.
-        before = np.searchsorted(pieces.j, count, side="right") + count
-        starts = np.ones(len(pieces.t) + len(jumps) + 1, dtype=bool)
-        starts[before] = starts[-1] = False
+    def j(self) -> np.ndarray:
+        """Jump counts ``(N,)``."""
+        count = len(self.rows.time)
+        return self._in_order(self.steps.place[:, 2], np.arange(count), count)
 
-        def in_order(of_steps: np.ndarray, of_jumps: np.ndarray, at_end: Any) -> np.ndarray:
-            column = np.empty((len(starts), *of_steps.shape[1:]), of_steps.dtype)
-            column[starts], column[before], column[-1] = of_steps, of_jumps, at_end
-            return column
+    @cached_property
+    def x(self) -> np.ndarray:
+        """States ``(N, n)``."""
+        return self._in_order(starts_of(self.blocks), self.rows.states[:, 0], self.course.end.x)
 
+    @cached_property
+    def mode(self) -> np.ndarray:
+        """Indices of the modes ``(N,)``."""
+        system, fired = self.course.system, self.rows.place[:, 1]
         sources = np.array([system.mode_index(tr.source) for tr in system.transitions], dtype=np.int64)
-        return (
-            in_order(pieces.t, jumps.t, end.t),
-            in_order(pieces.j, count, len(jumps)),
-            in_order(pieces.starts, jumps.x_minus, end.x),
-            in_order(pieces.mode, sources[jumps.transition_index], end.mode),
-        )
+        return self._in_order(self.steps.place[:, 1], sources[fired], self.course.end.mode)
+
+    @cached_property
+    def _places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Which points are starts of steps, and the places of those before jumps; the end is neither."""
+        count = np.arange(len(self.rows.time))
+        # The state before a jump follows the starts of all steps with as many jumps.
+        before = np.searchsorted(self.steps.place[:, 2], count, side="right") + count
+        starts = np.ones(len(self.steps.time) + len(count) + 1, dtype=bool)
+        starts[before] = starts[-1] = False
+        return starts, before
+
+    def _in_order(self, of_steps: np.ndarray, of_jumps: np.ndarray, at_end: Any) -> np.ndarray:
+        """A column of the points in order."""
+        starts, before = self._places
+        column = np.empty((len(starts), *of_steps.shape[1:]), of_steps.dtype)
+        column[starts], column[before], column[-1] = of_steps, of_jumps, at_end
+        return column
 
 
 class Filled(NamedTuple):
@@ -199,6 +196,11 @@ class Samples:
         return Filled(states, places, stop)
 
 
+def starts_of(blocks: Sequence[np.ndarray]) -> np.ndarray:
+    """States at the starts of the steps, ``(S, n)``, from their polynomials."""
+    return np.concatenate([block[:, 0, :-1] for block in blocks])
+
+
 def unfilled(samples: int, dimension: int) -> Filled:
     """Room for samples."""
     return Filled(np.empty((samples, dimension)), np.empty((2, samples), dtype=np.int64), 0)
@@ -248,11 +250,6 @@ class Pieces:
         phase, low, length = rows.time.T.copy()
         cycle, mode, jumps = rows.place.T.copy()
         return cls(blocks, time_at(cycle, phase, low, period), low, length, mode, jumps)
-
-    @property
-    def starts(self) -> np.ndarray:
-        """States at the starts of the steps, ``(S, n)``."""
-        return np.concatenate([block[:, 0, :-1] for block in self.blocks])
 
     @property
     def coefficients(self) -> np.ndarray:

@@ -317,7 +317,8 @@ class Trajectory:
         """A trajectory in another memory, whose run is what ``words`` gave once."""
         memory = self.plan.memory()
         self.plan.run_layout.words(memory.run)[:] = words
-        return attrs.evolve(self, memory=memory)
+        others = self.tangents, self.max_steps, self.phase0, self.beyond, self.stop
+        return Trajectory(self.compiled, self.plan, self.model, memory, *others)
 
     def release(self) -> None:
         """Let the next run have the memory of this one, which cannot be advanced or looked at any more."""
