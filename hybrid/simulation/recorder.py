@@ -77,7 +77,7 @@ class Recorder:
         if self.keeps_jumps:
             rows = JumpRows(*joined(self.jumps)) if self.jumps else no_jumps(trajectory.model.dimension)
         if self.times is not None:
-            points: Any = Samples(course, self.times, self.samples, rows)
+            points: Samples | Steps = Samples(course, self.times, self.samples, rows)
         else:
             assert rows is not None
             points = Steps(course, StepRows(*joined(self.steps)), self.blocks, rows)
@@ -123,6 +123,7 @@ class Recorder:
             if 2 * steps > self.steps_at_once:
                 # The arc keeps the record: new memory costs more than what of this was not used.
                 self.blocks.append(polynomials)
+                self.trajectory.let_go()
                 return code
             self.blocks.append(polynomials.copy())
         elif steps:

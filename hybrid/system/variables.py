@@ -158,11 +158,11 @@ class Variables:
 
     def parameter_values(self, overrides: Mapping[str, float] | None = None) -> np.ndarray:
         """Parameter vector ``(m,)`` with the overrides applied; unknown names raise an ArgumentError."""
-        values = dict(self.parameters)
+        values, names = self.defaults.copy(), self.parameter_names
         for name, number in named("parameters", overrides).items():
-            arguments.known("parameters: Parameter", name, values, "Parameters")
-            values[name] = arguments.number(f"parameters: Parameter {name!r}", number)
-        return np.array(list(values.values()), dtype=float)
+            arguments.known("parameters: Parameter", name, names, "Parameters")
+            values[names.index(name)] = arguments.number(f"parameters: Parameter {name!r}", number)
+        return values
 
     def as_units(self, value: object) -> Mapping[str, str]:
         """Units by name of a component, of a parameter or of the time ``t``, read-only."""

@@ -47,3 +47,17 @@ def test_tolerances_do_not_pile_up():
         found = cached.cache_info()
         assert found.maxsize is not None
         assert found.currsize <= found.maxsize
+
+
+def test_the_record_of_a_long_run_goes_with_its_arc():
+    """An arc keeps a record that is more than half full; the memory of the run does not hold it too."""
+    system = models.vibroimpact()
+    span = 0.0, 150 * system.forcing_period()
+    arc = hybrid.simulate(system, (0.0, 0.0, 0.0, 0.0), span, mode="free")
+    owner = arc._pieces.blocks[0]
+    while owner.base is not None:
+        owner = owner.base
+    held = weakref.ref(owner)
+    del arc, owner
+    gc.collect()
+    assert held() is None
