@@ -13,7 +13,7 @@ import numpy as np
 
 from hybrid.kernels.instructions.registers import whole_registers
 from hybrid.kernels.types import codes
-from hybrid.kernels.types.layout import COUNTERS, NUMBERS, Record, Run, Work
+from hybrid.kernels.types.layout import COUNTERS, NUMBERS, Record, Run, Task, Work
 from hybrid.kernels.types.starts import Starts
 from hybrid.kernels.types.structure import Layout
 from hybrid.simulation.periods import split_time
@@ -27,6 +27,7 @@ RECENT = 64
 MOST_LAYOUTS = 64
 # Places of what is written at the start of every run: in the arrays, this takes a quarter of the time.
 CYCLE, PHASE, HORIZON = COUNTERS.index("cycle"), NUMBERS.index("phase"), NUMBERS.index("horizon")
+MODEL, RECORD, TANGENTS = (Task._places[name] for name in ("model", "record", "tangents"))
 
 
 @cache
@@ -113,14 +114,13 @@ class Memory:
         return self._model
 
     def driven(self, model: Any, record: Any, tangents: int) -> Any:
-        """What the driver works on in the next burst: one task, which is changed for each."""
+        """What the driver works on in the next burst: one task, whose words are changed for each.
+
+        It does not hold the model and the record: they may go to somebody else when the burst is over.
+        """
         task = self._driven
-        if task.record is not record:
-            task.put(record=record)
-        if task.model is not model:
-            task.put(model=model)
-        if task.tangents != tangents:
-            task.put(tangents=tangents)
+        words = task.table
+        words[MODEL], words[RECORD], words[TANGENTS] = model.address, record.address, tangents
         return task
 
     def task(self, model: Any, *, orthonormal: bool) -> Any:

@@ -123,7 +123,6 @@ class Recorder:
             if 2 * steps > self.steps_at_once:
                 # The arc keeps the record: new memory costs more than what of this was not used.
                 self.blocks.append(polynomials)
-                self.trajectory.let_go()
                 return code
             self.blocks.append(polynomials.copy())
         elif steps:

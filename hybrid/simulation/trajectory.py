@@ -320,10 +320,6 @@ class Trajectory:
         others = self.tangents, self.max_steps, self.phase0, self.beyond, self.stop
         return Trajectory(self.compiled, self.plan, self.model, memory, *others)
 
-    def let_go(self) -> None:
-        """Do not hold the record of the last burst any more: somebody else keeps it."""
-        self.memory.driven(self.model, self.no_record(), self.tangents)
-
     def release(self) -> None:
         """Let the next run have the memory of this one, which cannot be advanced or looked at any more."""
         self.plan.take_back(self.memory)
