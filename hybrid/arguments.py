@@ -10,7 +10,7 @@ import functools
 import inspect
 import sys
 from collections.abc import Callable, Iterable, Mapping, Set
-from math import inf, isfinite
+from math import inf, isfinite, ulp
 from numbers import Real
 from typing import Any, ParamSpec, TypeVar
 from unicodedata import normalize
@@ -139,11 +139,14 @@ def numbers(name: str, value: object, wanted: str) -> np.ndarray:
 
 def time_span(name: str, value: object) -> tuple[float, float]:
     """A pair of finite times, the second not before the first."""
-    # A set has no order.
-    pair = None if isinstance(value, Set) else floats(value)
-    if pair is None or pair.shape != (2,):
-        raise refusal(name, "be a pair (t0, t1) of numbers", value)
-    t0, t1 = pair.tolist()
+    if type(value) is tuple and len(value) == 2 and type(value[0]) is type(value[1]) is float:
+        t0, t1 = value
+    else:
+        # A set has no order.
+        pair = None if isinstance(value, Set) else floats(value)
+        if pair is None or pair.shape != (2,):
+            raise refusal(name, "be a pair (t0, t1) of numbers", value)
+        t0, t1 = pair.tolist()
     if not (isfinite(t0) and isfinite(t1)):
         raise ArgumentError(f"{name} must be finite; got ({t0}, {t1}).")
     if t1 < t0:
@@ -159,17 +162,26 @@ def within(times: np.ndarray, t0: float, t1: float) -> np.ndarray | None:
 
     Ten times 0.1 is 1.0 or the number before it, as it is computed: either means the end of a run to 1.0.
     """
-    rounding = 4 * np.spacing(max(abs(t0), abs(t1)))
-    if times.size and not (times.min() >= t0 - rounding and times.max() <= t1 + rounding):
-        return None
-    return np.clip(times, t0, t1)
+    if not times.size:
+        return times
+    least, most = float(times.min()), float(times.max())
+    return _put_within(times, least, most, t0, t1)
+
+
+def _put_within(times: np.ndarray, least: float, most: float, t0: float, t1: float) -> np.ndarray | None:
+    """As `within`, for numbers of which the least and the largest one are known."""
+    if t0 <= least and most <= t1:
+        return times
+    rounding = 4 * ulp(max(abs(t0), abs(t1)))
+    return np.clip(times, t0, t1) if t0 - rounding <= least and most <= t1 + rounding else None
 
 
 def increasing_times(name: str, value: object, t0: float, t1: float) -> np.ndarray:
     """Times ``(N,)`` within ``[t0, t1]`` that never decrease; equal times are allowed."""
     times = numbers(name, value, "be increasing times of shape (N,)")
-    ordered = times.ndim == 1 and (times.size < 2 or bool((times[1:] >= times[:-1]).all()))
-    found = within(times, t0, t1) if ordered else None
+    found = None
+    if times.ndim == 1 and (times.size < 2 or bool((times[1:] >= times[:-1]).all())):
+        found = _put_within(times, times.item(0), times.item(-1), t0, t1) if times.size else times
     if found is None:
         raise _fault_of_times(name, times, t0, t1)
     return found
@@ -256,20 +268,31 @@ def known(what: str, value: object, allowed: Iterable[str], kind: str) -> str:
 
 def without_tolerances(function: Callable[Given, Kind]) -> Callable[Given, Kind]:
     """A function that says where tolerances belong if it is given some: to the solver."""
-    names = inspect.signature(function).parameters
-    misplaced = [name for name in SOLVER_OPTIONS if name not in names]
+    misplaced = misplaced_tolerances(function)
 
     @functools.wraps(function)
     def call(*args: Given.args, **kwargs: Given.kwargs) -> Kind:
-        for name in misplaced:
-            if name in kwargs:
-                raise ArgumentError(
-                    f"{function.__name__}: {name}= is an option of the solver. Write "
-                    f"solver=Taylor({name}={shown(kwargs[name])}), or another solver such as DOP853."
-                )
+        if not misplaced.isdisjoint(kwargs):
+            raise misplaced_refusal(function, misplaced, kwargs)
         return function(*args, **kwargs)
 
     return call
+
+
+def misplaced_tolerances(function: Callable[..., Any]) -> frozenset[str]:
+    """The options of solvers that a function does not have itself."""
+    return frozenset(SOLVER_OPTIONS) - inspect.signature(function).parameters.keys()
+
+
+def misplaced_refusal(
+    function: Callable[..., Any], misplaced: Set[str], given: Mapping[str, Any]
+) -> ArgumentError:
+    """The error for options of a solver that were given to a function: where they belong."""
+    name = next(name for name in SOLVER_OPTIONS if name in misplaced and name in given)
+    return ArgumentError(
+        f"{function.__name__}: {name}= is an option of the solver. Write "
+        f"solver=Taylor({name}={shown(given[name])}), or another solver such as DOP853."
+    )
 
 
 def _as_float(value: object) -> float | None:

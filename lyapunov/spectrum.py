@@ -259,8 +259,11 @@ def lyapunov_spectrum(
     orthonormal_at_start(trajectory)
     length = interval_length(trajectory, interval, transient + intervals)
     load_kernels("lyapunov.kernels")
+    estimate = Estimate(trajectory, length, k)
     with trajectory.stop, progress_bar(transient + intervals, "Lyapunov spectrum", progress) as bar:
-        return Estimate(trajectory, length, k).spectrum(transient, intervals, history, bar)
+        found = estimate.spectrum(transient, intervals, history, bar)
+    estimate.release()
+    return found
 
 
 def number_of_exponents(system: HybridSystem, k: int | None) -> int:

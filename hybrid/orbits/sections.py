@@ -159,6 +159,8 @@ def stroboscopic_section(
                 bar.update(len(states))
     states, places = (np.concatenate(parts) for parts in zip(*chunks, strict=True))
     cycle, index, count = places.T
+    status = status_of(trajectory, code)
+    trajectory.release()
     return Section(
         state_names=system.state_names,
         mode_names=system.mode_names,
@@ -166,7 +168,7 @@ def stroboscopic_section(
         x=states,
         mode=np.array(system.mode_names)[index],
         jumps=np.diff(count, prepend=before),
-        status=status_of(trajectory, code),
+        status=status,
         units=dict(system.units),
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cached_property
 from html import escape
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -12,74 +13,31 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import arguments
-from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.tables import counted, html_table
 from hybrid.errors import ArgumentError
 from hybrid.simulation.jumps import Grazing, Jumps, Sensitivities, known
 from hybrid.simulation.labelled import Names, attributes, with_counters
+from hybrid.simulation.points import Pieces, Samples, Steps
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
 
 if TYPE_CHECKING:
     import xarray
 
-# Dense output is evaluated at so many times per call of a kernel.
-TIMES_AT_ONCE = 100_000
+# The fields that are made when somebody asks, and where they are found.
+MADE_LATER = {
+    "parameters": attrgetter("course.parameters"),
+    "t": attrgetter("t"),
+    "j": attrgetter("j"),
+    "x": attrgetter("x"),
+    "_mode_index": attrgetter("mode"),
+    "_jumps": attrgetter("jumps"),
+    "status": attrgetter("course.status"),
+    "_pieces": attrgetter("pieces"),
+}
 
 
-@attrs.frozen(eq=False)
-class Pieces:
-    """The smooth steps of a run: ``S`` polynomials, each in a variable on ``[0, 1]``.
-
-    Attributes
-    ----------
-    blocks
-        The polynomials of successive steps, ``(steps of a block, d + 1, n + 1)`` each: coefficients of
-        ``1, theta, theta^2, ...`` of the state and, in the last column, of the time since the start of the
-        step. In a desingularised mode the time is not proportional to ``theta``.
-    t, low, h
-        Start of each step, the rounding error of that start, and the length of the step, ``(S,)``.
-    mode, j
-        Mode index and jump count of each, ``(S,)``.
-    """
-
-    blocks: list[np.ndarray]
-    t: np.ndarray
-    low: np.ndarray
-    h: np.ndarray
-    mode: np.ndarray
-    j: np.ndarray
-
-    @property
-    def starts(self) -> np.ndarray:
-        """States at the starts of the steps, ``(S, n)``."""
-        return np.concatenate([block[:, 0, :-1] for block in self.blocks])
-
-    @property
-    def coefficients(self) -> np.ndarray:
-        """The polynomials in one array, ``(S, d + 1, n + 1)``.
-
-        They are joined when somebody first asks: of a long run, that takes longer than the run.
-        """
-        if len(self.blocks) > 1:
-            self.blocks[:] = [np.concatenate(self.blocks)]
-        return self.blocks[0]
-
-    def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """States ``(len(times), n)``, and the steps they are taken from; at a jump, the state after it."""
-        coefficients = self.coefficients
-        states = np.empty((len(times), coefficients.shape[2] - 1))
-        index = np.empty(len(times), dtype=np.int64)
-        kernel = load_kernels("hybrid.kernels.steps.dense").states_at
-        times = np.ascontiguousarray(times)
-        # Between two calls Ctrl-C is heard.
-        for first in range(0, len(times), TIMES_AT_ONCE):
-            part = slice(first, first + TIMES_AT_ONCE)
-            kernel(times[part], self.t, self.low, self.h, coefficients, states[part], index[part])
-        return states, index
-
-
-@attrs.frozen(eq=False, repr=False)
+@attrs.frozen(eq=False, repr=False, slots=False)
 class HybridArc:
     """A solution over hybrid time ``(t, j)``; ``arc["q"]`` is one component of the state over it.
 
@@ -136,6 +94,27 @@ class HybridArc:
     rejected: int
     _pieces: Pieces | None
     _sensitivities: Sensitivities | None = None
+
+    @classmethod
+    def of_run(cls, points: Steps | Samples, **known: Any) -> HybridArc:
+        """The arc of a run from what it kept: all fields that are not ``known`` are made of this."""
+        arc = object.__new__(cls)
+        arc.__dict__.update(known, _sensitivities=None, _made_of=points)
+        return arc
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """A field that is made later, when somebody first asks for it."""
+            made_of = self.__dict__.get("_made_of")
+            if made_of is None or name not in MADE_LATER:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            # Another thread may have made it too: all see one object.
+            return self.__dict__.setdefault(name, MADE_LATER[name](made_of))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All fields, made by now: what they are made of stays where the run was."""
+        return {field.name: getattr(self, field.name) for field in attrs.fields(type(self))}
 
     @property
     def jumps(self) -> Jumps:
@@ -297,35 +276,3 @@ def without_component(arc: HybridArc, i: int, system: HybridSystem) -> HybridArc
         fundamental=None if fundamental is None else np.delete(fundamental, i, axis=0),
         pieces=pieces,
     )
-
-
-def hybrid_points(
-    system: HybridSystem, pieces: Pieces, jumps: Jumps, end: tuple[float, np.ndarray, int]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Times, jump counts, states, mode indices in order: step starts, states before jumps, the end."""
-    t_end, x_end, mode_end = end
-    count = np.arange(len(jumps))
-    # The state before a jump follows the starts of all steps with as many jumps.
-    before = np.searchsorted(pieces.j, count, side="right") + count
-    starts = np.ones(len(pieces.t) + len(jumps) + 1, dtype=bool)
-    starts[before] = starts[-1] = False
-
-    def in_order(of_steps: np.ndarray, of_jumps: np.ndarray, at_end: Any) -> np.ndarray:
-        column = np.empty((len(starts), *of_steps.shape[1:]), of_steps.dtype)
-        column[starts], column[before], column[-1] = of_steps, of_jumps, at_end
-        return column
-
-    sources = np.array([system.mode_index(tr.source) for tr in system.transitions], dtype=np.int64)
-    return (
-        in_order(pieces.t, jumps.t, t_end),
-        in_order(pieces.j, count, len(jumps)),
-        in_order(pieces.starts, jumps.x_minus, x_end),
-        in_order(pieces.mode, sources[jumps.transition_index], mode_end),
-    )
-
-
-def join(chunks: list[tuple[Any, ...]]) -> tuple[np.ndarray, ...]:
-    """Concatenate the columns of rows of arrays."""
-    if len(chunks) == 1:
-        return chunks[0]
-    return tuple(np.concatenate(column) for column in zip(*chunks, strict=True))

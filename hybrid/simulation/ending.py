@@ -53,6 +53,36 @@ def status_of(trajectory: Trajectory, code: int) -> Status:
     return attrs.evolve(status, message=" ".join([status.message, *notes])) if notes else status
 
 
+class Ending:
+    """How a run ended: its status, which is made when somebody asks for it.
+
+    Until then it holds a copy of what the run has counted, since the memory goes to the next run. The status
+    of a run that did not reach its end is made at once: it may look further than at the run.
+    """
+
+    def __init__(self, trajectory: Trajectory, code: int) -> None:
+        self._status: Status | None = None
+        self._held: tuple[Trajectory, np.ndarray] | None = None
+        if code == codes.DONE and trajectory.system.growth is None:
+            self._held = trajectory, trajectory.words()
+        else:
+            self._status = status_of(trajectory, code)
+
+    @property
+    def status(self) -> Status:
+        """The status."""
+        # Another thread may ask too: the status is there before what it is made of goes.
+        held = self._held
+        if held is not None:
+            trajectory, words = held
+            before = trajectory.as_it_was(words)
+            self._status = status_of(before, codes.DONE)
+            before.release()
+            self._held = None
+        assert self._status is not None
+        return self._status
+
+
 def _carries_plainly(trajectory: Trajectory) -> bool:
     """Whether there is nothing to tell of the tangent vectors of a run that has reached its end."""
     run = trajectory.run

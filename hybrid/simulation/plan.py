@@ -42,13 +42,14 @@ def check_solver(solver: object) -> Solver:
 class Plan:
     """What all runs of a system by a solver, with so many tangent vectors, have in common.
 
-    ``parts_so_far`` are ``parts`` without those that few runs call and that are not compiled yet. ``task``
-    keeps no record and lacks only what a run has for itself. ``model`` is that at the default parameters, see
-    ``CompiledSystem.moved_by``. ``propagators`` says how each mode is advanced, by the name of the mode;
-    ``degree`` is that of the steps in a record.
+    ``advance`` is the driver. ``parts_so_far`` are ``parts`` without those that few runs call and that are
+    not compiled yet. ``task`` keeps no record and lacks only what a run has for itself. ``model`` is that at
+    the default parameters, see ``CompiledSystem.moved_by``. ``propagators`` says how each mode is advanced,
+    by the name of the mode; ``degree`` is that of the steps in a record.
     """
 
     method: Any
+    advance: Any
     parts_so_far: Any
     task: Any
     model: Any
@@ -132,6 +133,7 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: i
         columns, rows = compiled.series_columns(tangents), compiled.emitted.programs.longest
         plan = Plan(
             method,
+            load_kernels().advance,
             completed(parts) if is_kept(LIMITS) else parts,
             _task(attempts, model, method, tangents),
             model,

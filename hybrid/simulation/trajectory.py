@@ -268,7 +268,7 @@ class Trajectory:
         The code is INTERRUPTED if the run was asked to stop. A run of few steps does not ask.
         """
         limit = self.max_steps if max_steps is None else max_steps
-        most = min(limit, self.steps + FIRST_BURST)
+        most = min(limit, self.memory.run.steps + FIRST_BURST)
         code = self._burst(cycle, phase, record, most, max_jumps)
         if code != codes.MAX_STEPS or most == limit:
             return code
@@ -283,11 +283,15 @@ class Trajectory:
         return code
 
     def _burst(self, cycle: int, phase: float, record: Any, max_steps: int, max_jumps: int) -> int:
-        advance, task = load_kernels().advance, self.task(record)
-        return self.plan.called(
-            lambda parts: advance(parts, task, cycle, phase, max_steps, max_jumps),
-            self.run,
-            self.work,
+        plan, memory = self.plan, self.memory
+        task = memory.driven(self.model, record, self.tangents)
+        parts = plan.parts_so_far
+        if parts.complete:
+            return int(plan.advance(parts, task, cycle, phase, max_steps, max_jumps))
+        return plan.called(
+            lambda parts: plan.advance(parts, task, cycle, phase, max_steps, max_jumps),
+            memory.run,
+            memory.work,
             record.used,
         )
 
@@ -304,6 +308,17 @@ class Trajectory:
         if self.tangents != task.tangents:
             changes["tangents"] = self.tangents
         return task.replace(**changes) if changes else task
+
+    def words(self) -> np.ndarray:
+        """All that the run is, as a copy, for ``as_it_was``."""
+        return self.plan.run_layout.words(self.memory.run).copy()
+
+    def as_it_was(self, words: np.ndarray) -> Trajectory:
+        """A trajectory in another memory, whose run is what ``words`` gave once."""
+        memory = self.plan.memory()
+        self.plan.run_layout.words(memory.run)[:] = words
+        others = self.tangents, self.max_steps, self.phase0, self.beyond, self.stop
+        return Trajectory(self.compiled, self.plan, self.model, memory, *others)
 
     def release(self) -> None:
         """Let the next run have the memory of this one, which cannot be advanced or looked at any more."""

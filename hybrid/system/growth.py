@@ -13,7 +13,7 @@ from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
 
 import numpy as np
 
-from hybrid.arguments import without_tolerances
+from hybrid.arguments import misplaced_refusal, misplaced_tolerances
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -67,10 +67,12 @@ def growing(function: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[
 
     The first argument is the system; a result therefore belongs to a system that has every mode it visits.
     """
-    function = without_tolerances(function)
+    misplaced = misplaced_tolerances(function)
 
     @wraps(function)
     def call(system: Any, *args: P.args, **kwargs: P.kwargs) -> R:
+        if not misplaced.isdisjoint(kwargs):
+            raise misplaced_refusal(function, misplaced, kwargs)
         # The function itself refuses what is no system.
         growth = None if isinstance(system, type) else getattr(system, "growth", None)
         while growth is not None:

@@ -118,17 +118,17 @@ class Variables:
                         "thing; rename one of the two."
                     )
 
-    @property
+    @cached_property
     def moving(self) -> int:
         """Number of components that have a field, the first ones."""
         return self.state if isinstance(self.state, int) else len(self.state)
 
-    @property
+    @cached_property
     def tangent_dimension(self) -> int:
         """Number of components that tangent vectors have: all but the counters, which come last."""
         return self.moving + len(self.held)
 
-    @property
+    @cached_property
     def dimension(self) -> int:
         """Number of state components ``n``: those with a field, those held, counters."""
         return self.tangent_dimension + len(self.counters)
@@ -158,11 +158,11 @@ class Variables:
 
     def parameter_values(self, overrides: Mapping[str, float] | None = None) -> np.ndarray:
         """Parameter vector ``(m,)`` with the overrides applied; unknown names raise an ArgumentError."""
-        values = dict(self.parameters)
+        values, names = self.defaults.copy(), self.parameter_names
         for name, number in named("parameters", overrides).items():
-            arguments.known("parameters: Parameter", name, values, "Parameters")
-            values[name] = arguments.number(f"parameters: Parameter {name!r}", number)
-        return np.array(list(values.values()), dtype=float)
+            arguments.known("parameters: Parameter", name, names, "Parameters")
+            values[names.index(name)] = arguments.number(f"parameters: Parameter {name!r}", number)
+        return values
 
     def as_units(self, value: object) -> Mapping[str, str]:
         """Units by name of a component, of a parameter or of the time ``t``, read-only."""
@@ -214,12 +214,13 @@ class Variables:
             pairs = zip(names, values, strict=True)
             component, bad = next(pair for pair in pairs if not isfinite(pair[1]))
             raise ArgumentError(f"{name}: component {component!r} must be finite; got {bad}.")
-        self.check_counts(name, found)
+        if self.counters:
+            self.check_counts(name, found)
         return found
 
     def completed(self, states: np.ndarray) -> np.ndarray:
         """States ``(..., n)``, with 0 for what is held or counts where only the others are given."""
-        if states.ndim == 0 or states.shape[-1] != self.moving:
+        if self.moving == self.dimension or states.ndim == 0 or states.shape[-1] != self.moving:
             return states
         return np.concatenate([states, np.zeros((*states.shape[:-1], self.dimension - self.moving))], axis=-1)
 

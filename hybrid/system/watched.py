@@ -51,15 +51,18 @@ class Watched:
 
     def holds(self) -> bool:
         """Whether all values are still what they were. This takes some microseconds, longer for tables."""
-        # Loops, as every run asks: over an empty list they cost nothing.
+        # Loops, as every run asks: over an empty list they cost nothing. Most values are the same object.
         for cell, _, value in self._cells:
-            if not _same(_content(cell), value):
+            found = _content(cell)
+            if found is not value and not _same(found, value):
                 return False
         for names, name, value in self._items:
-            if not _same(names.get(name, MISSING), value):
+            found = names.get(name, MISSING)
+            if found is not value and not _same(found, value):
                 return False
         for owner, name, value in self._attributes:
-            if not _same(getattr(owner, name, MISSING), value):
+            found = getattr(owner, name, MISSING)
+            if found is not value and not _same(found, value):
                 return False
         for array, content in self._arrays:
             if array.tobytes() != content:
@@ -129,7 +132,9 @@ class Watched:
             self._arrays.append((value, value.tobytes()))
         elif isinstance(value, list | tuple | dict | set | np.ndarray):
             items = _items(value)
-            self._lists.append((value, items))
+            if not isinstance(value, tuple):
+                # A tuple keeps its items; what these hold is watched below.
+                self._lists.append((value, items))
             for each in items:
                 self._read(each, attributes)
         elif isinstance(value, ModuleType):

@@ -282,6 +282,6 @@ def test_dense_output_is_the_same_in_parts(monkeypatch):
     run = simulate(bouncing_ball(), (1.0, 0.0), (0.0, 3.0))
     times = np.linspace(0.0, 3.0, 50)
     whole = run(times)
-    monkeypatch.setattr("hybrid.simulation.arc.TIMES_AT_ONCE", 7)
+    monkeypatch.setattr("hybrid.simulation.points.TIMES_AT_ONCE", 7)
     np.testing.assert_array_equal(run(times), whole)
     assert run(np.zeros(0)).shape == (0, 2)

@@ -47,3 +47,18 @@ def test_tolerances_do_not_pile_up():
         found = cached.cache_info()
         assert found.maxsize is not None
         assert found.currsize <= found.maxsize
+
+
+def test_the_record_of_a_long_run_goes_with_its_arc():
+    """An arc keeps a record that is more than half full; no memory of this run or of one before holds it."""
+    systems = [models.vibroimpact() for _ in range(2)]
+    for system, periods in zip(systems, (1, 150), strict=True):
+        span = 0.0, periods * system.forcing_period()
+        arc = hybrid.simulate(system, (0.0, 0.0, 0.0, 0.0), span, mode="free")
+    owner = arc._pieces.blocks[0]
+    while owner.base is not None:
+        owner = owner.base
+    held = weakref.ref(owner)
+    del arc, owner
+    gc.collect()
+    assert held() is None

@@ -18,7 +18,7 @@ class TestRecordsThatFillTheMemory:
 
     @pytest.fixture
     def small(self, monkeypatch):
-        monkeypatch.setattr("hybrid.simulation.simulate.memory_for_records", lambda: 1e6)
+        monkeypatch.setattr("hybrid.simulation.recorder.memory_for_records", lambda: 1e6)
 
     def test_the_run_ends_with_what_it_has(self, small):
         arc = hybrid.simulate(self.SYSTEM, (0.0, 1.0), (0.0, 1e6), mode="swing")
