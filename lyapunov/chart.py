@@ -22,14 +22,8 @@ from hybrid.solvers import Solver
 from hybrid.sweep.rows import At, Place, Rows, rows_of
 from hybrid.sweep.sheet import Labels
 from hybrid.transform.aged import aged
-from lyapunov.spectrum import (
-    Estimate,
-    Means,
-    first_vectors,
-    interval_length,
-    number_of_exponents,
-    orthonormal_at_start,
-)
+from lyapunov.directions import first_vectors, number_of_exponents
+from lyapunov.spectrum import Estimate, Means, interval_length, orthonormal_at_start
 from lyapunov.together import alike, means_together, result_of
 
 if TYPE_CHECKING:
@@ -177,16 +171,16 @@ class Exponents:
                 result_of(partial(self.rows.grown, partial(self._row, point=point, place=place)))
                 for point, place in zip(points, places, strict=True)
             ]
-        begun = [result_of(partial(self._begun, self.rows, *each)) for each in zip(points, places, strict=True)]
+        begun = [
+            result_of(partial(self._begun, self.rows, *each)) for each in zip(points, places, strict=True)
+        ]
         found: list[Any] = list(begun)
-        for rows in alike(begun):
-            means = means_together([begun[i] for i in rows], self.transient, self.intervals)
-            for i, each in zip(rows, means, strict=True):
-                found[i] = (
-                    each
-                    if isinstance(each, Exception)
-                    else result_of(partial(self._results, self.rows, points[i], begun[i], each))
-                )
+        for estimates in alike(begun):
+            means = means_together([*estimates.values()], self.transient, self.intervals)
+            for (i, estimate), each in zip(estimates.items(), means, strict=True):
+                found[i] = each
+                if not isinstance(each, Exception):
+                    found[i] = result_of(partial(self._results, self.rows, points[i], estimate, each))
         return found
 
     def _row(self, rows: Rows, point: Mapping[str, float], place: Place | None) -> dict[str, Any]:

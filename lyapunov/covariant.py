@@ -21,7 +21,8 @@ from hybrid.solvers import Solver
 from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
 from hybrid.transform.aged import aged
-from lyapunov.spectrum import generic_directions, interval_length
+from lyapunov.directions import generic_directions
+from lyapunov.spectrum import interval_length
 
 if TYPE_CHECKING:
     import xarray

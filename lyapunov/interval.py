@@ -38,8 +38,8 @@ class Growth(Structure, counters=("done", "count")):
     """
 
     counters: INDICES
-    end: End  # type: ignore[valid-type]
-    sums: Sums  # type: ignore[valid-type]
+    end: End
+    sums: Sums
     interval: REAL
     rates: MATRIX
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator, Mapping
-from functools import cache
 from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,7 +11,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybrid import ArgumentError, HybridSystem, Status, arguments, compile_system
+from hybrid import ArgumentError, HybridSystem, Status, arguments
 from hybrid.accuracy.averages import (
     TaperedMean,
     running_tapered_mean,
@@ -28,12 +27,12 @@ from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.pace import time_scale
 from hybrid.simulation.periods import check_time
-from hybrid.simulation.plan import check_solver
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.growth import growing
-from hybrid.transform.aged import aged, least_dimension, original_of, without_age
+from hybrid.transform.aged import least_dimension, original_of, without_age
 from lyapunov.batches import EMPTY, closed_batch_means
+from lyapunov.directions import first_vectors, generic_directions, number_of_exponents
 from lyapunov.interval import END, end_at, sums_layout
 from lyapunov.per_transition import JumpRates, PerTransition
 
@@ -266,19 +265,6 @@ def lyapunov_spectrum(
     return found
 
 
-def number_of_exponents(system: HybridSystem, k: int | None) -> int:
-    """How many exponents are asked for; None for as many as all modes have."""
-    most = least_dimension(compile_system(system).system)
-    return most if k is None else arguments.count("k", k, 1, most, ", the dimension of the state")
-
-
-def first_vectors(system: HybridSystem, k: int, solver: Solver | None) -> np.ndarray:
-    """Tangent vectors to start with for ``k`` exponents, as columns, with the age last."""
-    n = aged(compile_system(system).system).tangent_dimension
-    by_sum_rule = 1 < k == n and check_solver(solver).tableau.implicit
-    return generic_directions(n, k - by_sum_rule)
-
-
 def orthonormal_at_start(trajectory: Trajectory) -> None:
     """Make the tangent vectors of a run orthonormal again where its mode takes the age from them."""
     if trajectory.system.age is not None:
@@ -307,19 +293,6 @@ def interval_length(trajectory: Trajectory, interval: float | None, intervals: i
             f"{math.ulp(latest):.2g} apart. Lengthen it, or start nearer to time zero."
         )
     return length
-
-
-@cache
-def generic_directions(n: int, k: int) -> np.ndarray:
-    """Orthonormal directions ``(n, k)``, always the same, with a nonzero component along every axis.
-
-    Axes are often invariant, for example the axis of a clock. A first vector along such an axis would never
-    grow with the largest exponent.
-    """
-    directions, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(n, n)))
-    # Read-only, because the cache returns the same array to every caller.
-    directions.flags.writeable = False
-    return np.asarray(directions[:, :k])
 
 
 class Means(NamedTuple):

@@ -7,7 +7,6 @@ from functools import partial
 from typing import Any, TypeVar
 
 from hybrid.compiler.cache.loader import load_kernels
-from hybrid.display.progress import silent
 from hybrid.kernels.types import codes
 from hybrid.simulation.crew import Crew, together
 from hybrid.status import StatusCode
@@ -25,12 +24,12 @@ def result_of(call: Callable[[], Result]) -> Result | Exception:
         return failure
 
 
-def alike(estimates: Sequence[Estimate | Exception]) -> list[list[int]]:
-    """The places of estimates by their plan; errors are left out."""
-    found: dict[int, list[int]] = {}
+def alike(estimates: Sequence[Estimate | Exception]) -> list[dict[int, Estimate]]:
+    """The estimates of each plan, by their places; errors are left out."""
+    found: dict[int, dict[int, Estimate]] = {}
     for i, each in enumerate(estimates):
         if isinstance(each, Estimate):
-            found.setdefault(id(each.trajectory.plan), []).append(i)
+            found.setdefault(id(each.trajectory.plan), {})[i] = each
     return [*found.values()]
 
 
@@ -45,7 +44,9 @@ def means_together(estimates: Sequence[Estimate], transient: int, intervals: int
     crew = Crew(shared, first.plan, [each.task for each in estimates], growths)
     memory, onward = crew.memory, load_kernels("lyapunov.kernels").growth_of_run
     memory.max_steps[:] = [each.trajectory.max_steps for each in estimates]
-    asked = {i: next(each) for i, each in enumerate(work)}
+    asked: dict[int, Any] = {}
+    for i, each in enumerate(work):
+        go_on(i, partial(next, each), asked, found)
     while asked:
         memory.codes[:] = codes.DONE
         for i, rates in asked.items():
@@ -57,12 +58,16 @@ def means_together(estimates: Sequence[Estimate], transient: int, intervals: int
             done = int(growth.done)
             rates[:done] = growth.rates[:done]
             code = StatusCode.INTERRUPTED if code == codes.GO_ON else code
-            try:
-                asked[i] = work[i].send((done, code))
-            except StopIteration as end:
-                found[i] = end.value
-                del asked[i]
-            except Exception as failure:  # the run's own: the others go on
-                found[i] = failure
-                del asked[i]
+            del asked[i]
+            go_on(i, partial(work[i].send, (done, code)), asked, found)
     return found
+
+
+def go_on(i: int, more: Callable[[], Any], asked: dict[int, Any], found: list[Any]) -> None:
+    """Take what run ``i`` asks for next, or what it has found; its error is its own, the others go on."""
+    try:
+        asked[i] = more()
+    except StopIteration as end:
+        found[i] = end.value
+    except Exception as failure:
+        found[i] = failure

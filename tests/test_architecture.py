@@ -65,6 +65,7 @@ KERNEL_ROOMS = tuple(
         "limit",
         "evaluate",
         "drive",
+        "abreast",
     )
 )
 DOOR = "hybrid.kernels.types.numba_door"

@@ -9,7 +9,6 @@ tangent vectors. It writes their derivatives and, one place further, the diverge
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from itertools import accumulate
@@ -22,7 +21,7 @@ from hybrid.compiler.bounds.program import programs
 from hybrid.compiler.bounds.residues import residue_of_guard, residues
 from hybrid.compiler.cases import body_text, cases_of_index, function_text
 from hybrid.compiler.curvature import curvature
-from hybrid.compiler.emitted import NO_SERIES, Emitted, Propagator
+from hybrid.compiler.emitted import NO_SERIES, Emitted, Propagator, Series
 from hybrid.compiler.jacobians import (
     cells,
     gradient,
@@ -42,10 +41,11 @@ from hybrid.compiler.statements.values import assignments, unprintable
 from hybrid.compiler.steep import fields_at_crossings, steep_at_guards, steep_inside
 from hybrid.compiler.surfaces import surfaces
 from hybrid.compiler.tables import Tables
+from hybrid.compiler.told import told, where_it_jumps
 from hybrid.compiler.traced import Traces, expressions_of, period_of
 from hybrid.compiler.written import Written, beyond_guards, called, item, variational
 from hybrid.errors import ModelError
-from hybrid.expression.continuity import jumps_of, may_be_abrupt, may_jump
+from hybrid.expression.continuity import jumps_of, may_be_abrupt
 from hybrid.expression.derivatives import jacobian_of
 from hybrid.expression.graph import forget, nodes_of
 from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol
@@ -53,7 +53,6 @@ from hybrid.expression.operations import JUMPING
 from hybrid.expression.periodicity import is_periodic
 from hybrid.expression.signs import simplified
 from hybrid.expression.tabulated import Tabulated
-from hybrid.expression.text import text
 from hybrid.expression.tracing import Symbols, TraceError, model_symbols
 from hybrid.system.checks import derivative_has_time_column
 from hybrid.system.derivatives import complex_step_error
@@ -71,8 +70,6 @@ if TYPE_CHECKING:
     from hybrid.system.graph import HybridSystem
 
 Result = TypeVar("Result")
-# A state or a parameter in an expression.
-_INDEXED = re.compile(r"\b[xp]\[\d+\]")
 
 
 def emit(system: HybridSystem, traces: Traces | None = None) -> Emitted:
@@ -207,12 +204,12 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
         ),
         autonomous=tuple(is_free(field.expressions, (symbols.t,)) for field in fields),
         discontinuities=tuple(
-            _where_it_jumps(system, i, fields[i], boundaries[i], symbols) for i in range(len(fields))
+            where_it_jumps(system, i, fields[i], boundaries[i], symbols) for i in range(len(fields))
         ),
         proved_period=_has_proved_period(system, [*fields, *crossed, *conditions, *resets], writer),
-        steep=tuple(_told(system, powers) for powers in steep),
+        steep=tuple(told(system, powers) for powers in steep),
         steep_inside=tuple(
-            _told(system, steep_inside(field.expressions, around, symbols))
+            told(system, steep_inside(field.expressions, around, symbols))
             for field, around in zip(fields, boundaries, strict=True)
         ),
         crossing=crossing,
@@ -234,11 +231,15 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
 
 def _without_code(propagator: Propagator) -> Propagator:
     """The propagator without its statements, which are in the texts of the model."""
-    series, abreast = (
-        None if each is None else attrs.evolve(each, statements=(), tangent_statements=())
-        for each in (propagator.series, propagator.abreast)
+    return attrs.evolve(
+        propagator,
+        series=_bare(propagator.series),
+        abreast=None if propagator.abreast is None else _bare(propagator.abreast),
     )
-    return attrs.evolve(propagator, series=series, abreast=abreast)
+
+
+def _bare(series: Series) -> Series:
+    return attrs.evolve(series, statements=(), tangent_statements=())
 
 
 class _Writer:
@@ -439,31 +440,6 @@ def _gradients(
     pairs = zip(system.transitions, guards, strict=True)
     written = [guard for transition, guard in pairs if transition.source == mode and not transition.clock]
     return [None if guard.jacobian is None or guard.given else guard.jacobian[0] for guard in written]
-
-
-def _where_it_jumps(
-    system: HybridSystem, index: int, field: Written, boundaries: Sequence[Boundary], symbols: Symbols
-) -> str:
-    """Where the field of a mode jumps in what moves or is held, in words; empty if it is proved not to."""
-    if field.expressions is None:
-        function = field_function(system.modes[index], system.variables)
-        differentiable = function.derivative is None or complex_step_error(system.variables, function) is None
-        return "it branches" if may_jump(function.value, differentiable) else ""
-    known = known_positive(boundaries)
-    states = symbols.x[: system.tangent_dimension]
-    places = jumps_of([simplified(entry, known) for entry in field.expressions], states)
-    return ", or ".join(_in_names(system, place) for place in places)
-
-
-def _told(system: HybridSystem, expressions: Sequence[Expression]) -> str:
-    """Expressions in the names of the model."""
-    return ", ".join(_in_names(system, text(each)) for each in expressions)
-
-
-def _in_names(system: HybridSystem, words: str) -> str:
-    names = {f"x[{i}]": name for i, name in enumerate(system.state_names)}
-    names |= {f"p[{i}]": name for i, name in enumerate(system.parameters)}
-    return _INDEXED.sub(lambda match: names[match[0]], words)
 
 
 def _has_proved_period(system: HybridSystem, written: Iterable[Written], writer: _Writer) -> bool:

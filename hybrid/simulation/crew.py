@@ -24,7 +24,7 @@ from hybrid.kernels.types.structure import Layout
 from hybrid.simulation.memory import MOST_LAYOUTS
 
 # Numbers of a lane besides state, parameters and sizes, and those of each guard (``kernels.abreast.lanes``).
-NUMBERS, PER_GUARD = 11, 3
+NUMBERS, PER_GUARD = 12, 3
 # Rows of the series behind the last order; columns are read four at a time.
 ROWS_OF_END, SPARE_COLUMNS = 3, 3
 # A guard is looked at up to this degree, and divided by its variable.
@@ -34,7 +34,7 @@ POWERS = 16
 LONGEST_STAY, ALONE = 256, 32
 APART = {codes.TAYLOR: 1, codes.ROOTED: 1, codes.EXACT: 2, codes.DESINGULARISED: 16}
 # Runs that are advanced together: enough that lanes are full.
-TOGETHER = 8 * codes.ABREAST
+TOGETHER = 3 * codes.ABREAST
 # Steps of the first burst of a crew, and seconds of the others.
 FIRST_BURST, SECONDS = 4096, 0.02
 

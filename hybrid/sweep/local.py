@@ -16,9 +16,9 @@ import attrs
 import numpy as np
 
 from hybrid.compiler.interrupts import CTRL_C, stopped_by
-from hybrid.sweep.job import Job, Rhythm, carried
 from hybrid.kernels.types.codes import ABREAST
 from hybrid.simulation.crew import TOGETHER
+from hybrid.sweep.job import Job, Rhythm, carried
 from hybrid.sweep.outcome import Batch, Outcome, Part, attempt, attempts
 
 # Seconds between two looks for Ctrl-C, and how long workers may take to end after it: a task that calls
@@ -64,9 +64,7 @@ class _Run:
         # Numbers of points that were kept, an error, or None from a worker that has ended.
         # A SimpleQueue waits without end if its time is over when it has heard a signal.
         self.reports: Queue[int | BaseException | None] = Queue()
-        self.source: _Alone | _InLine = (
-            _Alone(job, workers) if job.lines is None else _InLine(job, self.stop)
-        )
+        self.source: _Alone | _InLine = _Alone(job, workers) if job.lines is None else _InLine(job, self.stop)
 
     def run(self, pool: ThreadPoolExecutor, report: Callable[[int], object]) -> bool:
         """Start the workers and wait for them."""
@@ -157,9 +155,7 @@ class _Alone:
         task, points = self.job.task, self.job.points
         if hasattr(task, "together"):
             while rows := list(islice(self.rows, self.at_once)):
-                yield from zip(
-                    rows, attempts(task, [*map(points.at, rows)], [None] * len(rows)), strict=True
-                )
+                yield from zip(rows, attempts(task, [*map(points.at, rows)], [None] * len(rows)), strict=True)
         for row in self.rows:
             yield row, attempt(task, points.at(row))
 

@@ -57,9 +57,9 @@ def simulate_many(
 ) -> xarray.Dataset:
     """Run a system from many starts: where each run ends, and its state at the samples.
 
-    The ends are those of :func:`hybrid.simulate`, up to rounding: runs take their steps together, and what one
-    finds depends on no other. With ``samples``, steps end at the samples. A run that fails does so alone. Ctrl-C ends the call, not the program: runs that are not
-    complete have the status ``NOT_RUN``.
+    The ends are those of :func:`hybrid.simulate`, up to rounding: runs take their steps together, but what
+    one finds depends on no other. With ``samples``, steps end at the samples. A run that fails does so alone.
+    Ctrl-C ends the call, not the program: runs that are not complete have the status ``NOT_RUN``.
 
     Parameters
     ----------
@@ -271,14 +271,16 @@ class _Runs:
         crew.memory.max_steps[:], crew.memory.max_jumps[:] = most, self.max_jumps
         onward = load_kernels("hybrid.kernels.events.many").sampled
         is_told = np.zeros(len(block), dtype=bool)
-        under_way = range(count)
+        under_way = list(range(count))
         while under_way:
             crew.memory.codes[:] = codes.DONE
-            crew.memory.codes[list(under_way)] = codes.GO_ON
+            crew.memory.codes[under_way] = codes.GO_ON
             finished = crew.go(onward, CTRL_C)
             now = [int(each.starts.now) for each in jobs]
             if not finished:
-                is_told[[i for i, code in zip(now, crew.memory.codes, strict=True) if code == codes.GO_ON]] = True
+                is_told[
+                    [i for i, code in zip(now, crew.memory.codes, strict=True) if code == codes.GO_ON]
+                ] = True
                 break
             # A run of which there is something to tell waits until that has been told.
             under_way = [row for row in under_way if now[row] >= 0]

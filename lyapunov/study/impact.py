@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from hybrid import DOP853, HybridSystem, Jump, Mode, Taylor, simulate
-from lyapunov.spectrum import generic_directions
+from lyapunov.directions import generic_directions
 from lyapunov.study.ode23s import Ode23s
 from lyapunov.study.runs import STARTS
 from lyapunov.study.tangents import UNSEEN, with_tangent

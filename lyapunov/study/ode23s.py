@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from hybrid import HybridSystem
 from hybrid.compiler.cache.loader import load_kernels
-from lyapunov.spectrum import generic_directions
+from lyapunov.directions import generic_directions
 from lyapunov.study.places import COUNTERS, SCRATCH_ROWS, STEP_TOO_SMALL
 
 # Parameters in the order of the compiled field.

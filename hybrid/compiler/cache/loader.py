@@ -41,6 +41,8 @@ LIMITS = "hybrid.kernels.limit.go"
 # runs never call.
 IN_SECOND = (
     "hybrid.kernels.jumps.jump",
+    "hybrid.kernels.jumps.plain",
+    "hybrid.kernels.abreast.pool",
     "hybrid.kernels.jumps.corner",
     "hybrid.kernels.events.initial_mode",
     "hybrid.kernels.guards.isolate",
@@ -50,6 +52,8 @@ IN_SECOND = (
 ALL_KERNELS = (
     DRIVER,
     "hybrid.kernels.jumps.jump",
+    "hybrid.kernels.jumps.plain",
+    "hybrid.kernels.abreast.pool",
     LIMITS,
     "hybrid.kernels.steps.radau",
     "hybrid.kernels.steps.runge_kutta",

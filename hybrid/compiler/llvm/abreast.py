@@ -63,10 +63,10 @@ class AbreastBody(Body):
 
     def _place(self, array: Any, indices: Sequence[Any]) -> Any:
         """The address of the first number of an entry."""
-        *rows, last = (self.value(each) for each in indices)
-        last = self.builder.mul(last, WHOLE(ABREAST))
+        places = [self.value(each) for each in indices]
+        last = self.builder.mul(places[-1], WHOLE(ABREAST))
         if isinstance(array, Matrix):
-            return array.address(*rows, last)
+            return array.address(places[0], last)
         return self.builder.gep(array.data, [last], source_etype=NUMBER)
 
     def _at(self, _: str, name: str, *indices: Any) -> Any:
@@ -136,7 +136,10 @@ class AbreastBody(Body):
             read: dict[Any, Any] = {}
 
             def entry(row: Any, column: Any, which: str) -> Any:
-                key = which, str(column.get_reference() if not hasattr(column, "reference") else column.reference)
+                key = (
+                    which,
+                    str(column.get_reference() if not hasattr(column, "reference") else column.reference),
+                )
                 if key not in read:
                     address = matrix.address(row, builder.mul(column, WHOLE(ABREAST)))
                     read[key] = builder.load(address, align=8, typ=ROW)

@@ -28,7 +28,10 @@ COSINE = (
 
 
 def sine(builder: Any, x: Any, *, shift: int = 0) -> Any:
-    """The sine of each number of a register, within about a unit in the last place; a cosine for ``shift`` 1."""
+    """The sine of each number of a register, within about a unit in the last place.
+
+    For ``shift`` 1 it is the cosine.
+    """
     width = x.type.count
     kind, whole = vector_of(width), ir.VectorType(ir.IntType(64), width)
 

@@ -27,10 +27,10 @@ from hybrid.compiler.propagators.writing import (
 from hybrid.compiler.statements.code import Statement, at, call, get, loop, put, several
 from hybrid.compiler.statements.values import assignments
 from hybrid.compiler.taylor.loops import GROUPS, ORDER, VECTORS, StateLoop, TangentLoop, below_highest
-from hybrid.compiler.taylor.series import OUT, ONE_THEN_ZERO, NoSeries, Recurrences, o
+from hybrid.compiler.taylor.series import ONE_THEN_ZERO, OUT, NoSeries, Recurrences, o
 from hybrid.expression.derivatives import derivative, directional, divergence
 from hybrid.expression.graph import all_replaced, is_negative, is_whole, replaced
-from hybrid.expression.nodes import ZERO, Expression, Symbol, add, multiply
+from hybrid.expression.nodes import Expression, Symbol, add, multiply
 from hybrid.expression.operations import Absolute
 from hybrid.expression.tabulated import tables_of_time
 from hybrid.expression.tracing import Symbols
@@ -38,6 +38,8 @@ from hybrid.kernels.types.codes import DESINGULARISED, EXACT, ROOTED, RUNGE_KUTT
 
 # Rows below those of a series: the values at the end, what they are sums of, and a row for each guard.
 ROWS_OF_END = 2
+# A longer system keeps its loops over components: here each has statements of its own.
+MOST_STATES = 32
 
 
 def write_abreast(
@@ -52,8 +54,9 @@ def write_abreast(
     state and time, and what its value is a sum of.
     """
     guards = [boundary.guard for boundary in boundaries if boundary.guard is not None]
-    traced = field is not None and len(guards) == len(boundaries)
-    if not traced or found.kind == RUNGE_KUTTA or tables_of_time(*field, *guards):
+    if field is None or len(guards) < len(boundaries) or tables_of_time(*field, *guards):
+        return None
+    if len(symbols.x) > MOST_STATES or found.kind == RUNGE_KUTTA:
         return None
     if found.degree > 0 and not all(found.guards):
         # Of such a guard the polynomials of the state tell no end.
@@ -252,7 +255,14 @@ class AbreastLoop(StateLoop):
         lefts = [left for left, _ in block.pairs]
         rights = [block.beside(i) for i in range(len(lefts))]
         inner = [block.inner(i) for i in range(len(lefts))]
-        return [*products(inner, lefts, rights), *step, *self._state(), *block.higher, *self._stored(), *self._rates()]
+        return [
+            *products(inner, lefts, rights),
+            *step,
+            *self._state(),
+            *block.higher,
+            *self._stored(),
+            *self._rates(),
+        ]
 
     def _state(self) -> list[Statement]:
         return [put(at("out", o, target), name) for target, name in self.names.items()]

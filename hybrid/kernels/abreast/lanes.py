@@ -25,13 +25,13 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Time, what it has lost in rounding, and whole periods; the time since the entry, the longest step; the time
 # until the next step must end; the time that the last stay took, and its share by which a step may exceed
-# that; the steps taken, the integral of div f, and whether the roots are those that a step ended with.
-T, LOW, CYCLE, SINCE, LONGEST_STEP, ROOM, STAY, AHEAD_OF_STAY, STEPS, DIVERGENCE, FOLLOWS = range(11)
-NUMBERS = 11
+# that; the steps taken, the integral of div f, whether the roots are those of a step, the period.
+T, LOW, CYCLE, SINCE, LONGEST_STEP, ROOM, STAY, AHEAD_OF_STAY, STEPS, DIVERGENCE, FOLLOWS, PERIOD = range(12)
+NUMBERS = 12
 
 
 class Places(NamedTuple):
-    """The first entries of the parameters, the numbers, the sizes and the guards; and the number of guards."""
+    """The first entries of parameters, numbers, sizes and guards; and the number of guards."""
 
     parameters: INTEGER
     numbers: INTEGER
@@ -85,6 +85,7 @@ def come_aboard(lane, places, task, room, row):
     lane[first + STAY * ABREAST], lane[first + AHEAD_OF_STAY * ABREAST] = run.stay[mode], beyond
     lane[first + STEPS * ABREAST], lane[first + DIVERGENCE * ABREAST] = 0.0, 0.0
     lane[first + FOLLOWS * ABREAST] = 1.0 if run.stage == READY else 0.0
+    lane[first + PERIOD * ABREAST] = model.period
     for i in range(n):
         lane[(places.sizes + i) * ABREAST + row] = run.scale[i]
     slot, place = model.first_outgoing[mode], places.guards * ABREAST + row

@@ -1,17 +1,15 @@
 """Runs that wait in a pool until others are in the same mode, and then take a step together."""
 
-import math
-
 from numba import njit
 
 from hybrid.kernels.abreast.lanes import ROOM, STEPS, come_aboard, holds_roots, leave, order_of, places_in
 from hybrid.kernels.abreast.rows import bits_of, mask_of
 from hybrid.kernels.abreast.step import step_abreast
+from hybrid.kernels.arithmetic.bernstein import NO_ROOT
 from hybrid.kernels.drive import Room, complete, keep_scale, prepare, remember_scale
 from hybrid.kernels.events.guards import has_program
 from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.guards.touch import forget_touches
-from hybrid.kernels.arithmetic.bernstein import NO_ROOT
 from hybrid.kernels.steps.field.late import is_late
 from hybrid.kernels.steps.series import land
 from hybrid.kernels.types.abreast import ONWARD, Abreast, Crew
@@ -61,7 +59,7 @@ def take_ashore(sea, task, row):
     span, t = sea.ends[row], run.phase
     run.steps += 1
     for i in range(n):
-        run.scale[i] = max(run.scale[i] if on_guard else 0.0, powers[order + 2, i * ABREAST + row])
+        run.scale[i] = powers[order + 2, i * ABREAST + row]
         run.y[i] = powers[order + 1, i * ABREAST + row]
     if tangents > 0:
         run.divergence += powers[order + 1, (n + last - first + 1) * ABREAST + row]

@@ -97,7 +97,7 @@ def put_rows(typing_context, array, place, rows):
 
     def generate(context, builder, signature, arguments):
         address = _address(context, builder, array, arguments[0], arguments[1:2])
-        write(builder, *_in_rows(builder, [rows], arguments[2:]), address)
+        write(builder, _in_rows(builder, [rows], arguments[2:])[0], address)
         return context.get_dummy_value()
 
     return types.void(array, types.intp, rows if rows == ROWS else types.float64), generate
@@ -109,7 +109,7 @@ def put_entry(typing_context, array, row, column, rows):
 
     def generate(context, builder, signature, arguments):
         address = _address(context, builder, array, arguments[0], arguments[1:3])
-        write(builder, *_in_rows(builder, [rows], arguments[3:]), address)
+        write(builder, _in_rows(builder, [rows], arguments[3:])[0], address)
         return context.get_dummy_value()
 
     return types.void(array, types.intp, types.intp, rows if rows == ROWS else types.float64), generate
@@ -218,6 +218,7 @@ def _comparison(symbol):
 
 def _choice(symbol):
     """The larger or the smaller number of each run; ``b`` where one is nan."""
+
     @intrinsic
     def choose(typing_context, a, b):
         kinds = [each if each == ROWS else types.float64 for each in (a, b)]

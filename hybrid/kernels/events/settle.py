@@ -108,7 +108,7 @@ def violates_all(model, verdicts):
 
 @njit(**KERNEL)
 def begin(parts, task, job):
-    """Begin the next run that has a mode; DONE without one, and REFUSED if more than one mode allows a start."""
+    """Begin the next run that has a mode; DONE without one, REFUSED if more than one mode allows a start."""
     run, starts, progress = task.run, job.starts, job.progress
     found, named = starts.found, starts.named
     while True:

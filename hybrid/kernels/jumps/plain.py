@@ -20,6 +20,7 @@ from hybrid.kernels.events.guards import (
 )
 from hybrid.kernels.events.moments import speed_rounding
 from hybrid.kernels.events.onset import BY_SPEED
+from hybrid.kernels.events.surface import finds_surface
 from hybrid.kernels.jumps.jump import ends_own_flight, is_grazing, judge, move
 from hybrid.kernels.jumps.locked import postpone_map
 from hybrid.kernels.jumps.record import remember_jump
@@ -31,7 +32,7 @@ from hybrid.kernels.types.codes import (
 )
 from hybrid.kernels.types.kinds import INTEGER, TRUTH
 from hybrid.kernels.types.layout import EPSILON, Task
-from hybrid.kernels.types.options import INLINE, KERNEL, exported
+from hybrid.kernels.types.options import INLINE, exported
 from hybrid.kernels.types.task import task_of
 
 # A guard is clear of zero if it is so many times as far from it as rounding, and so is a speed.
@@ -109,7 +110,9 @@ def acceleration(model, other, mode, t, work):
     total = 0.0
     for i in range(model.dimension):
         if work.gradient[i] != 0.0:
-            bend = work.jacobian[i, model.dimension] + change_of_rate(model, mode, i, work.jacobian, work.field)
+            bend = work.jacobian[i, model.dimension] + change_of_rate(
+                model, mode, i, work.jacobian, work.field
+            )
             total += work.gradient[i] * bend
     if model.affine_guard[other] == 1:
         return total
@@ -185,6 +188,8 @@ def jump_plainly(task, fired):
     asked = tangents > 0 or record.jump_phase.shape[0] > 0
     log_determinant, distortion = 0.0, 0.0
     if tangents > 0:
+        if model.affine_guard[fired] == 0 and finds_surface(model, fired, t, run.y, transversality, work):
+            return False
         model.reset_jacobian(fired, t, run.y, parameters, work.reset_jacobian)
         saltation_of(model, fired, transversality, work)
         log_determinant = log_determinant_of(work.saltation, work.jacobian, n)
@@ -193,9 +198,9 @@ def jump_plainly(task, fired):
         distortion = run.strain + strain(work.saltation, model.controlled, log_determinant)
         if task.orthonormal != 0 and not distortion < STRAINED:
             return False
-    if asked and not ends_own_flight(model, run, fired, transversality):
-        if is_grazing(model, method, run, fired, transversality, work):
-            return False
+    judged = asked and not ends_own_flight(model, run, fired, transversality)
+    if judged and is_grazing(model, method, run, fired, transversality, work):
+        return False
     restitution = impulse_of(model, run, fired, mode == target, transversality, work)
     for i in range(n):
         work.error[i] = run.scale[i]

@@ -44,8 +44,8 @@ class Crew(Structure, counters=("parameters", "begun", "steps", "alone", "budget
     ``waiting (modes + 1, R)`` are the runs that wait for others in their mode, and in the last row those that
     step alone, ``counts (modes + 1,)`` of them; ``aboard (modes, W)`` those that are in a lane, -1 for none.
     ``longest (modes,)`` is the number of steps after which a run leaves its lane. A model has so many
-    ``parameters``; with ``begun`` 0 the runs have not been brought to their first steps. So many ``steps`` have been taken abreast,
-    and by runs ``alone``; a call ends when both have reached the ``budget``.
+    ``parameters``; with ``begun`` 0 the runs have not been brought to their first steps. So many ``steps``
+    have been taken abreast, and by runs ``alone``; a call ends when both have reached the ``budget``.
     """
 
     counters: INDICES
@@ -65,6 +65,6 @@ class Crew(Structure, counters=("parameters", "begun", "steps", "alone", "budget
     longest: INDICES
 
 
-# What a run does next, given its number and the code with which it has come to its time, or ended; GO_ON at the
-# beginning. The result is GO_ON if it has a new time, or the code with which it is over.
+# What a run does next, given its number and the code with which it has come to its time, or ended; GO_ON at
+# the beginning. The result is GO_ON if it has a new time, or the code with which it is over.
 ONWARD = function(INTEGER, Parts, Task, Crew, INTEGER, INTEGER)

@@ -1,11 +1,12 @@
 """The structures that kernels pass around.
 
-A trajectory is one flat vector ``y`` of ``n (1 + k)`` entries: the state first, then ``k`` tangent vectors
-one after the other, so that each of them is contiguous. ``n`` is the dimension, ``k`` the number of tangents.
+A trajectory is one flat vector ``y`` of ``n (1 + k)`` entries: the ``n`` of the state, then ``k`` tangent
+vectors one after the other, so that each of them is contiguous.
 """
 
 from typing import NamedTuple
 
+from hybrid.kernels.types.entries import COUNTERS, NUMBERS
 from hybrid.kernels.types.kinds import (
     CUBE,
     INDEX_MATRIX,
@@ -213,78 +214,6 @@ class Method(Structure):
     max_step: REAL
 
 
-COUNTERS = (
-    "mode",
-    "cycle",
-    "jumps",
-    "steps",
-    "rejected",
-    "stage",
-    "last_fired",
-    "jumps_here",
-    "singular_jumps",
-    "pending",
-    "previous_mode",
-    "chattering",
-    "chatter_jumps",
-    "grazings",
-    "ill_conditioned",
-    "order_mattered",
-    "grazing_guard",
-    "touched_guard",
-    "touched_step",
-    "last_kind",
-    "locked",
-    "map_is_known",
-    "at_rest",
-    "round",
-    "stretch_steps",
-    "stretch_moved",
-    "indistinct",
-    "unchecked",
-    "unresolved",
-    "coarse",
-    "steep_jumps",
-    "ran_dry",
-    "field_jumps",
-    "jumped_in",
-    "entry_cycle",
-    "turned",
-    "turned_to",
-    "clear",
-    "distant",
-)
-NUMBERS = (
-    "phase",
-    "next_step",
-    "last_jump_cycle",
-    "last_jump_phase",
-    "divergence",
-    "log_determinant",
-    "largest_saltation",
-    "last_step",
-    "last_ratio",
-    "ill_conditioned_growth",
-    "grazing_place",
-    "grazing_value",
-    "next_grazing",
-    "restitution",
-    "last_transversality",
-    "log_determinant_before",
-    "ill_conditioned_growth_before",
-    "strain",
-    "since_entry",
-    "phase_low",
-    "horizon",
-    "lateness",
-    "longest_step",
-    "unknown_time",
-    "stretch_left",
-    "entry_phase",
-    "entry_low",
-)
-
-
 class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     """The mutable state of one trajectory: all that a run needs to be taken up again.
 
@@ -294,36 +223,33 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
       since; 2 if its speed vanishes too, 3 if its acceleration does as well, 4 if it jumps across zero there.
     - ``due (transitions,)``: 1 if the guard has been crossed at this instant and has not fired yet.
     - ``recent``: the last to fire; jump ``j`` is at ``j`` modulo the length. ``fires``: how often each has.
-    - ``visits (64, n + 2)``: the states right after those jumps, with their phases and cycles.
+      ``visits (64, n + 2)``: the states right after those jumps, with their phases and cycles.
     - ``rehearsal (4, transitions)``: scratch for jumps that are only tried; in the last row, the sides of
       guards before the crossings found on the last step.
     - ``passed (transitions,)``: the share of the last step at which each guard changed sides without firing
-      before the crossing found on the step; then the middle between the two. ``NO_ROOT`` if it did not.
-    - ``unproved (transitions,)``: the number of steps on which the crossings of each guard are not proved.
+      before its crossing, then the middle between the two; ``NO_ROOT`` if it did not. ``unproved
+      (transitions,)``: on how many steps the crossings of each guard are not proved.
     - ``tick (transitions,)``: the number of the next tick of each transition; ``ticked (transitions,)``: that
       of the first tick of a clock that has not fired anything yet. ``ticks`` are the numbers of all
       clocks, those of a transition from ``model.first_tick`` on: period and offset, or times, or a duration.
       The mode was entered in the period ``entry_cycle`` at ``entry_phase``, and ``entry_low`` of rounding.
-    - ``turned``: jumps at ticks that changed which transition of their clock may fire, last to ``turned_to``.
-    - ``clear``: 1 if the last jump has left the state clear of all guards but its own, with the sides of all in
-      ``rehearsal``: first the side of each, then whether it is zero.
-    - ``distant``: 1 if the last step has proved that every guard of the mode is far from zero at its end.
-    - ``horizon``: how long the run takes, as far as it is known at its start; 0 if it is not.
-    - ``longest_step``: the longest step in time so far; ``lateness``: the largest change that the rounding of
-      the time made in a step or jump, in tolerances.
-    - ``unknown_time``: the largest error that the time of a jump may have where a guard came to rest, and the
+      ``turned``: jumps at ticks that changed which transition of their clock may fire, last to ``turned_to``.
+    - ``clear``: 1 if the last jump has left the state clear of all guards but its own, whose sides are in
+      ``rehearsal``; ``distant``: 1 if the last step has proved that all guards are far from zero at its end.
+    - ``horizon``: how long the run takes, 0 if that is not known at its start; ``longest_step`` in time so
+      far; ``lateness``: the largest change that the rounding of the time made, in tolerances;
+      ``unknown_time``: the largest error that the time of a jump may have where a guard came to rest, and the
       transition ``ran_dry`` there; 0 if the tolerances cover it.
     - ``first_step, stay (modes,)``: the first step of the last stay in each mode, and how long it lasted.
-    - ``scale (n,)``: the size of the components over the last step; rounding is judged against it.
-    - ``stretch (n,)``: the state after ``stretch_steps`` steps, with the time ``stretch_left`` left. From
-      there the run has to get on. ``stretch_moved`` is 1 if the state has moved since.
-    - ``growth (k,)``: sums of the logarithms of the lengths that orthonormalisation took out of tangents.
-    - ``trail (4, n + 1)``: follows jumps to their limit; its rows have names (``codes``).
+    - ``scale (n,)``: the size of the components over the last step; rounding is judged against it. From
+      ``stretch (n,)``, the state after ``stretch_steps`` steps, with the time ``stretch_left`` left, the run
+      has to get on; ``stretch_moved`` is 1 if the state has moved since.
+    - ``growth (k,)``: sums of the logarithms of the lengths that orthonormalisation took out of tangents;
+      ``trail (4, n + 1)`` follows jumps to their limit; its rows have names (``codes``).
     - ``before (n k,)``, ``growth_before (k,)``: the tangent vectors and their growth before a jump that sets
-      off others at the same instant.
-    - ``instant (n (1 + n),)``: the derivative of that instant, then the columns of the tangent map of its
-      jumps so far. If ``map_is_known`` is 0, the first ``n`` numbers are the state before the jump instead,
-      and the map is computed when it is needed.
+      off others at the same instant. ``instant (n (1 + n),)``: the derivative of that instant, then the
+      columns of the tangent map of its jumps so far. If ``map_is_known`` is 0, the first ``n`` numbers are
+      the state before the jump instead, and the map is computed when it is needed.
     """
 
     counters: INDICES

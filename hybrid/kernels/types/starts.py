@@ -28,7 +28,7 @@ class Starts(Structure, counters=("now",)):
 
 
 class Sampled(Structure, counters=("sample",)):
-    """Runs whose states ``(N, S, n)`` are kept at ``S`` times, the last one their end; the next is ``sample``.
+    """Runs whose states ``(N, S, n)`` are kept at ``S`` times, the last one their end; next is ``sample``.
 
     ``starts.found (N, 3)`` gets the mode, the number of jumps and the number of states reached.
     """

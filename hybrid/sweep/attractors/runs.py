@@ -89,10 +89,10 @@ class Runs:
         crew = Crew(together(self.compiled, plan, 0), plan, tasks, jobs)
         crew.memory.max_steps[:] = self.setup.solver.max_steps
         onward = load_kernels("hybrid.kernels.events.settle").settle
-        under_way = range(count)
+        under_way = list(range(count))
         while under_way:
             crew.memory.codes[:] = codes.DONE
-            crew.memory.codes[list(under_way)] = codes.GO_ON
+            crew.memory.codes[under_way] = codes.GO_ON
             if not crew.go(onward, CTRL_C):
                 # A run that is under way is not complete, nor is one that has not begun.
                 over = found[:, CODE] != StatusCode.NOT_RUN
