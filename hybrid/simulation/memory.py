@@ -13,7 +13,8 @@ import numpy as np
 
 from hybrid.kernels.instructions.registers import whole_registers
 from hybrid.kernels.types import codes
-from hybrid.kernels.types.layout import COUNTERS, NUMBERS, Record, Run, Task, Work
+from hybrid.kernels.types.entries import COUNTERS, NUMBERS
+from hybrid.kernels.types.layout import Record, Run, Task, Work
 from hybrid.kernels.types.starts import Starts
 from hybrid.kernels.types.structure import Layout
 from hybrid.simulation.periods import split_time

@@ -74,15 +74,27 @@ class Tolerance(NamedTuple):
 
 
 @njit(**INLINE)
+def size_from_origin(series, controlled):
+    """How far a state at the origin gets while what moves it changes by its own size, in any unit of time."""
+    first, second, third = 0.0, 0.0, 0.0
+    for i in range(controlled):
+        first, second = max(first, abs(series[1, i])), max(second, abs(series[2, i]))
+        third = max(third, abs(series[3, i]))
+    if first > 0.0:
+        pace = max(second / first, math.sqrt(third / first))
+        return first / pace if pace > 0.0 else first
+    pace = third / second if second > 0.0 else 0.0
+    return second / pace**2 if pace > 0.0 else max(second, third)
+
+
+@njit(**INLINE)
 def weigh_state(series, n, controlled, tolerance, weights):
     """One over the tolerance of each component of the state into ``weights``; all other weights are zero."""
     largest, (rtol, atol, exact) = 0.0, tolerance
     for i in range(controlled if exact else 0):
         largest = max(largest, abs(series[0, i]))
     if exact and largest == 0.0:
-        # At rest at the origin, the first terms determine the size.
-        for i in range(controlled):
-            largest = max(largest, abs(series[1, i]), abs(series[2, i]), abs(series[3, i]))
+        largest = size_from_origin(series, controlled)
     floor = SHARE * rtol * largest + TINY if exact else atol + TINY
     for i in range(0, n, NARROW):
         store(weights, 0, i, 1.0 / (floor + rtol * magnitude(load(series, 0, i))))
