@@ -11,9 +11,9 @@ from hybrid.kernels.instructions.registers import NUMBER, built_in, vector_of
 
 # Beyond this size the quadrant is no longer exact; there the functions of one number are called.
 LARGEST = 1e5
-# Pi half in two parts, the second as large as the rounding of the first.
+# Pi half in three parts: whole numbers of the first two, up to the largest, have no rounding (Cody and Waite).
 PER_QUADRANT = 0.6366197723675814
-QUADRANT, REST = 1.5707963267948966, 6.123233995736766e-17
+QUADRANT = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
 # A float plus this number is rounded to a whole number, which its last bits hold.
 ROUND = 6755399441055744.0
 # Minimax polynomials on a quadrant, the highest power first (fdlibm, k_sin.c and k_cos.c).
@@ -39,7 +39,7 @@ def sine(builder: Any, x: Any, *, shift: int = 0) -> Any:
         return kind([number] * width)
 
     def fused(a: Any, b: Any, c: Any) -> Any:
-        return built_in(builder, "fma", width, a, b, c)
+        return built_in(builder, "fmuladd", width, a, b, c)
 
     def polynomial(coefficients: tuple[float, ...], z: Any) -> Any:
         total = all_of(coefficients[0])
@@ -50,8 +50,9 @@ def sine(builder: Any, x: Any, *, shift: int = 0) -> Any:
     shifted = fused(x, all_of(PER_QUADRANT), all_of(ROUND))
     quadrants = builder.fsub(shifted, all_of(ROUND))
     bits = builder.add(builder.bitcast(shifted, whole), whole([shift] * width))
-    rest = fused(quadrants, all_of(-QUADRANT), x)
-    rest = fused(quadrants, all_of(-REST), rest)
+    rest = x
+    for part in QUADRANT:
+        rest = fused(quadrants, all_of(-part), rest)
     z = builder.fmul(rest, rest)
     odd = fused(builder.fmul(rest, z), polynomial(SINE, z), rest)
     even = fused(builder.fmul(z, z), polynomial(COSINE, z), fused(z, all_of(-0.5), all_of(1.0)))
