@@ -8,7 +8,7 @@ from itertools import accumulate
 import attrs
 
 from hybrid.compiler.emitted import Series
-from hybrid.compiler.taylor.loops import padded
+from hybrid.compiler.taylor.convolutions import padded
 from hybrid.kernels.types.codes import WIDE
 
 

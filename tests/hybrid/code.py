@@ -49,11 +49,14 @@ OPERATIONS = {
     **{name: getattr(np, name) for name in OF_MATH},
     **{f"np.{name}": getattr(np, name) for name in ("floor", "ceil", "trunc", "rint", "fmod")},
     **{name: named(name) for name in ("erf", "erfc")},
-    **{name: getattr(lanes, name) for name in ("load", "store", "store_down", "store_row", "four_times")},
+    **{
+        name: getattr(lanes, name)
+        for name in ("load", "store", "store_down", "store_row", "four", "four_times")
+    },
     **{
         name: getattr(columns, name)
         for name in (
-            *("convolve", "convolve_pairs", "convolved", "add_ends", "add_ends_of_pairs"),
+            *("convolve", "convolve_pairs", "convolved", "convolved_pairs", "add_ends", "add_ends_of_pairs"),
             *("combine", "combine_tangents", "spread_tangents"),
         )
     },

@@ -83,6 +83,10 @@ class AbreastBody(Body):
             return self.builder.load(self.values["t"].data, align=8, typ=ROW)
         return super()._get(_, name)
 
+    def _listed(self, _: str, numbers: Sequence[Any], index: Any) -> Any:
+        value = super()._listed(_, numbers, index)
+        return value if value.type == WHOLE else self.number(value)
+
     def _length(self, _: str, array: str) -> Any:
         return self.builder.sdiv(self.values[array].length, WHOLE(ABREAST))
 
@@ -114,49 +118,45 @@ class AbreastBody(Body):
             raise LoweringError("a branch is taken by all runs abreast, or by none")
         super()._when(condition, body, other)
 
-    def _sums_of_products(self, _: str, __: Any, order: Any, lefts: Any, rights: Any) -> tuple[Any, ...]:
+    def _sums_of_products(
+        self, _: str, __: Any, order: Any, lefts: Any, rights: Any, whole: int
+    ) -> tuple[Any, ...]:
         """``out[j, left] * out[order - j, right]``, summed over ``0 < j < order``, for several pairs.
 
-        The terms with the order before come last: they are known last.
+        The terms with the order before come last: they are known last. If the sums are ``whole`` they have
+        that with ``j = order``, too.
         """
         at, pairs = self.value(order), list(zip(lefts[1:], rights[1:], strict=True))
         found: list[Any] = []
         for first in range(0, len(pairs), MOST_SUMS):
-            found += self._some_sums(at, pairs[first : first + MOST_SUMS])
+            found += self._some_sums(at, pairs[first : first + MOST_SUMS], whole)
         return tuple(found)
 
-    def _some_sums(self, order: Any, pairs: Sequence[Any]) -> list[Any]:
-        builder, matrix = self.builder, self.values["out"]
-        columns = [[self.value(each) for each in pair] for pair in pairs]
+    def _some_sums(self, order: Any, pairs: Sequence[Any], whole: int) -> list[Any]:
+        builder, matrix, one = self.builder, self.values["out"], WHOLE(1)
+        columns = [[builder.mul(self.value(each), WHOLE(ABREAST)) for each in pair] for pair in pairs]
         sums = [self.front.alloca(ROW) for _ in columns]
         for each in sums:
             builder.store(ROW([0.0] * ABREAST), each)
 
+        def entry(row: Any, column: Any) -> Any:
+            # LLVM reads a factor once that several products share.
+            return builder.load(matrix.address(row, column), align=8, typ=ROW)
+
         def add_terms(place: Any) -> None:
-            read: dict[Any, Any] = {}
-
-            def entry(row: Any, column: Any, which: str) -> Any:
-                key = (
-                    which,
-                    str(column.get_reference() if not hasattr(column, "reference") else column.reference),
-                )
-                if key not in read:
-                    address = matrix.address(row, builder.mul(column, WHOLE(ABREAST)))
-                    read[key] = builder.load(address, align=8, typ=ROW)
-                return read[key]
-
             other = builder.sub(order, place)
             for (left, right), total in zip(columns, sums, strict=True):
-                term = entry(place, left, "left"), entry(other, right, "right")
+                term = entry(place, left), entry(other, right)
                 builder.store(multiply_add(builder, *term, builder.load(total)), total)
 
-        one = WHOLE(1)
-        with loop(builder, WHOLE(2), builder.sub(order, one), one) as place:
+        last = builder.add(order, one) if whole else builder.sub(order, one)
+        with loop(builder, WHOLE(2), last, one) as place:
             add_terms(place)
-        with builder.if_then(builder.icmp_signed(">", order, WHOLE(2))):
+        with builder.if_then(builder.icmp_signed(">", order, WHOLE(0 if whole else 2))):
             add_terms(one)
-        with builder.if_then(builder.icmp_signed(">", order, one)):
-            add_terms(builder.sub(order, one))
+        if not whole:
+            with builder.if_then(builder.icmp_signed(">", order, one)):
+                add_terms(builder.sub(order, one))
         return [builder.load(each) for each in sums]
 
     def _call(self, name: str, terms: Sequence[Any]) -> Any:
@@ -195,6 +195,7 @@ class AbreastBody(Body):
         **dict.fromkeys(("+", "-", "*", "/", "//", "**", "%"), _arithmetic),
         "sums_of_products": _sums_of_products,
         "at": _at,
+        "listed": _listed,
         "get": _get,
         "neg": _negative,
         "and": _both,

@@ -20,7 +20,7 @@ from hybrid.kernels.instructions.columns import (
     write_spread,
 )
 from hybrid.kernels.instructions.loops import declared
-from hybrid.kernels.instructions.registers import everywhere, read, write, write_down, write_row
+from hybrid.kernels.instructions.registers import everywhere, four, read, write, write_down, write_row
 from hybrid.kernels.types.codes import HEAD, NARROW
 
 NUMBER = ir.DoubleType()
@@ -90,6 +90,13 @@ def _store(builder: Any, matrix: Any, row: Any, column: Any, value: Any) -> None
     write(builder, lanes, matrix.address(row, column))
 
 
+def _convolved(
+    builder: Any, matrix: Any, order: Any, lefts: Any, firsts: Any, widths: Any, *others: Any, **pairs: bool
+) -> Any:
+    # The widths are part of the call: they come as a term.
+    return write_convolved(builder, matrix, order, lefts, firsts, widths[1:], *others, **pairs)
+
+
 def _spread(builder: Any, y: Any, n: int, matrix: Any, first: Any, stride: Any) -> None:
     write_spread(builder, y.data, y.length, n, matrix, first, stride)
 
@@ -140,10 +147,12 @@ CALLS = {
     "store_down": Call(write_down),
     "store_row": Call(write_row),
     "table": Call(_table),
+    "four": Call(four, on_numbers=True),
     "four_times": Call(lambda builder, number: everywhere(builder, number, NARROW)),
     "convolve": Call(write_convolution),
     "convolve_pairs": Call(partial(write_convolution, pairs=True)),
-    "convolved": Call(write_convolved),
+    "convolved": Call(_convolved),
+    "convolved_pairs": Call(partial(_convolved, pairs=True)),
     "add_ends": Call(write_ends),
     "add_ends_of_pairs": Call(partial(write_ends, pairs=True)),
     "combine": Call(write_combination),

@@ -11,6 +11,8 @@ import attrs
 from llvmlite import binding
 
 from hybrid.compiler.interrupts import between_passes
+from hybrid.kernels.instructions.registers import Vectors
+from hybrid.kernels.types.codes import NARROW, WIDE
 
 # LLVM's highest level of optimisation, and the lowest one that keeps numbers in registers.
 SPEED, HASTE = 3, 1
@@ -35,6 +37,20 @@ def cpu() -> tuple[str, str]:
     if chosen:
         return chosen, ""
     return binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+
+
+@cache
+def vectors() -> Vectors:
+    """The vector registers of the processor: with AVX-512 there are 32 of eight numbers, else 16 of four.
+
+    Others than sums need two of them.
+    """
+    name, features = cpu()
+    if "+avx512f" in features or name == "x86-64-v4":
+        return Vectors(WIDE, 30)
+    # In halves, four numbers take two of the registers.
+    in_halves = name in ("x86-64", "x86-64-v2")
+    return Vectors(NARROW, 6 if in_halves else 14)
 
 
 def _new_target(level: int = SPEED) -> Any:

@@ -14,6 +14,7 @@ import attrs
 from llvmlite import ir
 
 from hybrid.compiler.llvm.calls import CALLS, NUMBER, WHOLE
+from hybrid.compiler.llvm.engine import vectors
 from hybrid.compiler.statements.code import KNOWN, LoweringError
 from hybrid.kernels.instructions.loops import loop
 from hybrid.kernels.instructions.registers import Matrix, everywhere, vector_of
@@ -138,6 +139,7 @@ class Body:
         # Variables are allocated in the first block: LLVM turns only those into registers.
         self.front = ir.IRBuilder(function.append_basic_block("front"))
         self.builder = Builder(function.append_basic_block("body"))
+        self.builder.vectors = vectors()
         self.values: dict[str, Any] = {}
         self.variables: dict[str, Any] = {}
         # Arrays of this function: their sizes, until they are first written.
@@ -315,7 +317,10 @@ class Body:
         return self.builder.load(self.builder.gep(address, [self.value(index)], source_etype=kind), typ=kind)
 
     def _item(self, _: str, term: Any, place: int) -> Any:
-        return self.value(term)[place]
+        value = self.value(term)
+        if isinstance(value, tuple | list):
+            return value[place]
+        return self.builder.extract_element(value, ir.IntType(32)(place))
 
     def _rounded(self, _: str, term: Any) -> Any:
         flags, self.flags = self.flags, ()
@@ -422,8 +427,12 @@ class Body:
         call = CALLS[name]
         arguments = []
         for place, term in enumerate(terms):
-            value = term if place in KNOWN.get(name, ()) else self.value(term)
-            if isinstance(value, tuple):
+            if place in KNOWN.get(name, ()):
+                arguments.append(term)
+                continue
+            value = self.value(term)
+            # Whole numbers alone are columns.
+            if isinstance(value, tuple) and any(each.type != WHOLE for each in value):
                 value = [self.number(each) for each in value]
             arguments.append(self.number(value) if call.on_numbers else value)
         return call(self.builder, *arguments)

@@ -11,7 +11,7 @@ from hybrid.kernels.instructions.registers import NUMBER, built_in, vector_of
 
 # Beyond this size the quadrant is no longer exact; there the functions of one number are called.
 LARGEST = 1e5
-# Pi half in three parts: whole numbers of the first two, up to the largest, have no rounding (Cody and Waite).
+# Pi half in three parts: products of the first two with whole numbers have no rounding (Cody and Waite).
 PER_QUADRANT = 0.6366197723675814
 QUADRANT = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
 # A float plus this number is rounded to a whole number, which its last bits hold.

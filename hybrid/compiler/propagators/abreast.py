@@ -26,8 +26,9 @@ from hybrid.compiler.propagators.writing import (
 )
 from hybrid.compiler.statements.code import Statement, at, call, get, loop, put, several
 from hybrid.compiler.statements.values import assignments
-from hybrid.compiler.taylor.loops import GROUPS, ORDER, VECTORS, StateLoop, TangentLoop, below_highest
-from hybrid.compiler.taylor.series import ONE_THEN_ZERO, OUT, NoSeries, Recurrences, o
+from hybrid.compiler.taylor.convolutions import below_highest
+from hybrid.compiler.taylor.loops import GROUPS, VECTORS, StateLoop
+from hybrid.compiler.taylor.series import ONE_THEN_ZERO, ORDER, OUT, NoSeries, Recurrences, o
 from hybrid.expression.derivatives import derivative, directional, divergence
 from hybrid.expression.graph import all_replaced, is_negative, is_whole, replaced
 from hybrid.expression.nodes import Expression, Symbol, add, multiply
@@ -214,14 +215,6 @@ def magnitude(expression: Expression, variables: Sequence[Symbol]) -> Expression
 class AbreastRecurrences(Recurrences):
     """The recurrences of one tangent vector of each run."""
 
-    def at(self, order: Any, column: Any) -> Any:
-        """An entry of a column."""
-        return at("out", order, column)
-
-    def put(self, column: Any, value: Any) -> Statement:
-        """Statement that writes an entry of order ``o``."""
-        return put(at("out", o, column), value)
-
     def beside(self, *place: int) -> Any:
         """The column of a factor in a block."""
         return get("v") + get(f"{self.prefix}b{place[0]}") + place[1]
@@ -252,17 +245,16 @@ class AbreastLoop(StateLoop):
         """Statements for order ``o``; ``shrink`` is 1/o."""
         block = self.block
         step = [put(name, get("shrink") * self._rate(i)) for i, name in enumerate(self.names.values())]
-        lefts = [left for left, _ in block.pairs]
-        rights = [block.beside(i) for i in range(len(lefts))]
-        inner = [block.inner(i) for i in range(len(lefts))]
-        return [
-            *products(inner, lefts, rights),
-            *step,
-            *self._state(),
-            *block.higher,
-            *self._stored(),
-            *self._rates(),
+        rights = [block.beside(i) for i in range(len(block.pairs))]
+        inner = [block.inner(i) for i in range(len(rights))]
+        sums = products(inner, [left for left, _ in block.pairs], rights)
+        # The term with a first factor that is a component of the state is known by now.
+        led = [
+            put(inner[i], inner[i] + block.led[pair] * at("out", 0, rights[i]))
+            for i, pair in enumerate(block.pairs)
+            if pair in block.led
         ]
+        return [*sums, *step, *led, *self._state(), *block.higher, *self._stored(), *self._rates()]
 
     def _state(self) -> list[Statement]:
         return [put(at("out", o, target), name) for target, name in self.names.items()]
@@ -273,17 +265,22 @@ class AbreastLoop(StateLoop):
         return [put(at("out", o, column), value) for column, value in columns.items()]
 
 
-class AbreastTangents(TangentLoop):
-    """The loop over the tangent vectors of each run."""
+class AbreastTangents:
+    """Statements for the series of the tangent vectors of each run, one after the other."""
 
     def __init__(self, seeds: Sequence[Symbol], block: Recurrences) -> None:
-        super().__init__(seeds, block)
+        self.components, self.block = len(seeds), block
+        self.values: list[Any] = []
         block.rows |= {seed: get("v") + i for i, seed in enumerate(seeds)}
+
+    def compute(self, rates: Sequence[Expression]) -> None:
+        """Write the recurrences of the rates; this also requests the series of the state that they need."""
+        self.values = [self.block.coefficient(rate) for rate in rates]
 
     @property
     def columns(self) -> int:
         """Number of columns that a tangent vector needs."""
-        return self.components + sum(map(len, self.block.blocks.values()))
+        return self.components + len(self.block.pairs)
 
     def first(self) -> list[Statement]:
         """Statements for order zero, and for order one of the vectors themselves."""
@@ -291,8 +288,7 @@ class AbreastTangents(TangentLoop):
             put(at("out", 0, get("v") + i), at("x", (get("g") + 1) * self.components + i))
             for i in range(self.components)
         ]
-        later = [self._later(1, i, value) for i, value in enumerate(self.values)]
-        return self._each([*begun, *self.block.first, *later])
+        return self._each([*begun, *self.block.first, *self._stored(), *self._later(1, 1.0)])
 
     def higher(self) -> list[Statement]:
         """Statements for order ``o``, and for order ``o + 1`` of the vectors themselves."""
@@ -302,12 +298,22 @@ class AbreastTangents(TangentLoop):
                 names.append(block.inner(i, place))
                 lefts.append(left)
                 rights.append(block.beside(i, place))
-        later = [self._later(o + 1, i, get("later") * value) for i, value in enumerate(self.values)]
-        statements = self._each([*products(names, lefts, rights), *block.higher, *later])
-        return below_highest([put(get("later"), 1.0 / (o + 1)), *statements])
+        # All orders of the other factors are known: those of the state.
+        sums = products(names, lefts, rights, whole=1)
+        later = [put(get("later"), 1.0 / (o + 1))]
+        each = [*sums, *block.higher, *self._stored(), *self._later(o + 1, get("later"))]
+        return below_highest([*later, *self._each(each)])
 
-    def _later(self, order: Any, place: int, value: Any) -> Statement:
-        return put(at("out", order, get("v") + place), value)
+    def _stored(self) -> list[Statement]:
+        block = self.block
+        return [
+            put(at("out", o, block.beside(i, place)), block.pairs[left, right])
+            for i, (left, rights) in enumerate(block.blocks.items())
+            for place, right in enumerate(rights)
+        ]
+
+    def _later(self, order: Any, scale: Any) -> list[Statement]:
+        return [put(at("out", order, get("v") + i), scale * value) for i, value in enumerate(self.values)]
 
     def _each(self, statements: Any) -> list[Statement]:
         return [loop("g", 0, GROUPS, [put(get("v"), VECTORS + get("g") * self.columns), *statements])]
@@ -321,8 +327,14 @@ class AbreastTangents(TangentLoop):
         return found
 
 
-def products(names: Sequence[Any], lefts: Sequence[Any], rights: Sequence[Any]) -> list[Statement]:
-    """The statement for the sums of products of two columns without both ends, if there are any."""
+def products(
+    names: Sequence[Any], lefts: Sequence[Any], rights: Sequence[Any], whole: int = 0
+) -> list[Statement]:
+    """The statement for sums of products of two columns, without the first term, if there are any.
+
+    The last term, with order ``o`` of the left column, is left out unless they are to be ``whole``.
+    """
     if not names:
         return []
-    return [put(several(names), call("sums_of_products", OUT, o, several(lefts), several(rights)))]
+    sums = call("sums_of_products", OUT, o, several(lefts), several(rights), whole)
+    return [put(several(names), sums)]

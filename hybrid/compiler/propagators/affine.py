@@ -7,8 +7,8 @@ from hybrid.compiler.propagators.equations import Equations
 from hybrid.compiler.propagators.writing import OTHERS, groups, harmonics_of, names_of_state, write_series
 from hybrid.compiler.statements.code import get
 from hybrid.compiler.statements.values import Constants, assignments
+from hybrid.compiler.taylor.convolutions import padded
 from hybrid.compiler.taylor.linear import LinearForm, linear_form, table_statements
-from hybrid.compiler.taylor.loops import padded
 from hybrid.expression.nodes import Expression, Symbol
 from hybrid.expression.tracing import Symbols
 from hybrid.kernels.types.codes import EXACT, WIDE

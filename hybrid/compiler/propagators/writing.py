@@ -23,9 +23,10 @@ from hybrid.compiler.statements.code import (
     whole,
 )
 from hybrid.compiler.statements.values import Constants, assignments
-from hybrid.compiler.taylor.loops import GROUPS, ORDER, StateLoop, TangentLoop, padded
+from hybrid.compiler.taylor.convolutions import padded
+from hybrid.compiler.taylor.loops import GROUPS, StateLoop, TangentLoop, reciprocal
 from hybrid.compiler.taylor.pairs import columns_of
-from hybrid.compiler.taylor.series import ONE_THEN_ZERO, PAIRS, Recurrences, o
+from hybrid.compiler.taylor.series import ONE_THEN_ZERO, ORDER, PAIRS, Recurrences, o
 from hybrid.expression.derivatives import derivative, directional, divergence
 from hybrid.expression.graph import mentions, nodes_of
 from hybrid.expression.nodes import ZERO, Expression, Symbol, add, order_of
@@ -186,7 +187,6 @@ class Body:
         carried = TangentLoop(list(seeds.values()), vectors)
         carried.compute(tangents)
         placed = self._place_pairs(moved) | carried.places()
-        together = [*moved.higher(), *carried.higher()]
         shared = [*self.preamble, *self.constants.statements(), put(o, 0)]
         return Series(
             (*named(places), *shared, *alone.first(), each_order(alone.higher())),
@@ -195,8 +195,8 @@ class Body:
                 groups(self.n),
                 *shared,
                 *moved.first(),
-                *carried.first(),
-                each_order(together),
+                each_order(moved.higher()),
+                *carried.statements(),
             ),
             padded(max(width, self.columns), WIDE),
             0,
@@ -260,4 +260,4 @@ def named(places: Mapping[str, int]) -> list[Statement]:
 
 def each_order(statements: Sequence[Statement]) -> Statement:
     """The loop over all orders above zero."""
-    return loop("o", 1, ORDER + 1, [put(get("shrink"), 1.0 / o), *statements])
+    return loop("o", 1, ORDER + 1, [put(get("shrink"), reciprocal(o)), *statements])

@@ -31,6 +31,8 @@ RETURNED = {
     "load": LANES,
     "four_times": LANES,
     "convolved": LANES,
+    "convolved_pairs": LANES,
+    "four": LANES,
     "divided_dot_product": LANES,
     "length": WHOLE,
 }

@@ -1,46 +1,29 @@
-"""The loop over orders for the recurrences of the state, and of four tangent vectors at a time."""
+"""The loops over orders for the recurrences of the state, and of four tangent vectors at a time."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
-from hybrid.compiler.statements.code import (
-    Code,
-    Statement,
-    at,
-    call,
-    do,
-    either,
-    get,
-    less,
-    loop,
-    put,
-    several,
-    when,
-)
+from hybrid.compiler.statements.code import Code, Statement, at, call, do, get, less, loop, put, several, when
+from hybrid.compiler.taylor.convolutions import AT_HAND, InMemory, convolutions, in_turn, padded
 from hybrid.compiler.taylor.pairs import Layer, layers
-from hybrid.compiler.taylor.series import OUT, Recurrences, o
+from hybrid.compiler.taylor.series import ORDER, OUT, Recurrences, o
+from hybrid.expression.graph import mentions
 from hybrid.expression.nodes import Expression, Symbol
-from hybrid.kernels.types.codes import NARROW, WIDE
+from hybrid.kernels.types.codes import HIGHEST_ORDER, NARROW, WIDE
 
-ORDER, TABLE, VECTORS, GROUPS = map(get, ("order", "table", "vectors", "groups"))
-
-
-def below_highest(statements: Sequence[Statement]) -> list[Statement]:
-    """Statements for an order that has a next one."""
-    return [when(less(o, ORDER), statements)] if statements else []
+TABLE, VECTORS, GROUPS = map(get, ("table", "vectors", "groups"))
 
 
-def padded(width: int, whole: int = NARROW) -> int:
-    """A width rounded up to a multiple of ``whole``."""
-    return -(-width // whole) * whole
+def reciprocal(order: Any) -> Code:
+    """``1 / order`` from a list: to divide takes longer."""
+    return call("listed", (0.0, *(1.0 / each for each in range(1, HIGHEST_ORDER + 2))), order)
 
 
 class StateLoop:
     """Statements for the series of ``y' = rates`` from ``starts``, in the columns ``targets``.
-
-    In a sum of products, the terms of the orders before the last are added one order in advance.
 
     Parameters
     ----------
@@ -74,24 +57,26 @@ class StateLoop:
         squares = [block.rows.get(right) == left for left, right in block.pairs]
         return layers([left for left, _ in block.pairs], squares, block.prefix)
 
+    @cached_property
+    def sums(self) -> InMemory:
+        """How the convolutions are summed; all of them must be known."""
+        return convolutions(self.block, self.layers())
+
     def first(self) -> list[Statement]:
         """Statements for order zero."""
-        block = self.block
         begin = [put(name, start) for name, start in zip(self.names.values(), self.starts, strict=True)]
-        last = [put(name, 0.0) for name, _ in self._last()]
-        return [*begin, *self._separate(), *block.first, *self._rows(), *self._rates(), *self._sums(1), *last]
+        return [*begin, *self._known(self.block.first), *self.sums.first(), *self.sums.keep()]
 
     def higher(self) -> list[Statement]:
         """Statements for order ``o``; ``shrink`` is 1/o. No order comes after ``order``."""
-        block = self.block
-        inner = [put(block.inner(i), at("out", o, block.beside(i))) for i in range(len(block.pairs))]
-        names = self.names.values()
-        step = [put(name, get("shrink") * self._rate(i)) for i, name in enumerate(names)]
-        sums = below_highest(self._sums(o + 1))
-        ends = self._ends()
-        sums = [*inner, *ends, *sums] if self._is_short else [*ends, *sums, *inner]
-        last = [put(name, value) for name, value in self._last()]
-        return [*sums, *step, *self._separate(), *block.higher, *self._rows(), *self._rates(), *last]
+        sums = self.sums
+        step = [put(name, get("shrink") * self._rate(i)) for i, name in enumerate(self.names.values())]
+        begin = [*sums.ends(), *step, *sums.inner(), *sums.later()]
+        return [*begin, *self._known(self.block.higher), *sums.keep()]
+
+    def _known(self, statements: Sequence[Statement]) -> list[Statement]:
+        """What is done once the components of an order are known."""
+        return [*self._separate(), *statements, *self._rows(), *self._rates()]
 
     def _rate(self, place: int) -> Code:
         return get(f"{self.block.prefix}r{place}")
@@ -112,111 +97,127 @@ class StateLoop:
         rows += [(get(row.right), [values[i] for i in row.places]) for row in found if row.right != row.left]
         if block.common_left is None:
             rows += [
-                (get(row.left), [at("out", o, left) for left in row.lefts]) for row in found if row.lefts
+                (get(row.left), [block.newest(left) for left in row.lefts]) for row in found if row.lefts
             ]
         return [do("store_row", OUT, o, column, several(numbers)) for column, numbers in rows]
-
-    def _sums(self, order: Any) -> list[Statement]:
-        """The terms of an order that contain no order above the last but one."""
-        name = "convolve" if self.block.common_left is not None else "convolve_pairs"
-        return [do(name, OUT, order, 2, *factors) for factors in self._factors()]
-
-    @property
-    def _is_short(self) -> bool:
-        """Whether an order takes no longer than it takes to write a register and to read it."""
-        return len(self.block.pairs) <= NARROW
-
-    def _last(self) -> list[tuple[Code, Any]]:
-        """Names of all factors' coefficients in the order before, with their values at the end of an order.
-
-        Order two has one term with them. With few convolutions it is faster to keep them than to read them.
-        """
-        if not self._is_short:
-            return []
-        found = list[tuple[Code, Any]]()
-        for i, ((left, _), value) in enumerate(self.block.pairs.items()):
-            found.append((self._before("q", i), either(less(1, o), at("out", o, left), 0.0)))
-            found.append((self._before("p", i), value))
-        return found
-
-    def _before(self, letter: str, place: int) -> Code:
-        return get(f"{self.block.prefix}{letter}{place}")
-
-    def _ends(self) -> list[Statement]:
-        """The terms of order ``o`` with the order before; order one has none."""
-        block = self.block
-        name = "add_ends" if block.common_left is not None else "add_ends_of_pairs"
-        found = [do(name, OUT, o, *factors) for factors in self._factors()]
-        if self._is_short:
-            found = []
-            for i, (left, _) in enumerate(block.pairs):
-                q, p, inner = self._before("q", i), self._before("p", i), block.inner(i)
-                ends = q * at("out", 1, block.beside(i)) + at("out", 1, left) * p
-                found.append(put(inner, inner + ends))
-        return [when(less(1, o), found)] if found else []
-
-    def _factors(self) -> list[tuple[Any, ...]]:
-        """Columns of the factors of all convolutions, their number and the widest register."""
-        common = self.block.common_left
-        return [
-            (get(row.left) if common is None else common, get(row.right), padded(len(row.places)), WIDE)
-            for row in self.layers()
-        ]
 
 
 class TangentLoop:
     """Statements for the series of four tangent vectors at a time, with columns from ``vectors`` on.
 
     The four coefficients of a component form one vector. The vectors of the components come one after the
-    other; the operands of products with common factors follow.
+    other; the operands of products with common factors follow. These factors are series of the state, which
+    are complete before those of the first four vectors begin. The sums of products are built up as those of
+    ``InRegisters``, with one register for each product.
     """
 
     def __init__(self, seeds: Sequence[Symbol], block: Recurrences) -> None:
+        self.names = [get(f"{block.prefix}v{i}") for i in range(len(seeds))]
         block.rows |= {seed: get("v") + NARROW * i for i, seed in enumerate(seeds)}
-        self.components, self.block = len(seeds), block
+        block.variables |= dict(zip(seeds, self.names, strict=True))
+        self.block = block
         self.values: list[Any] = []
 
     def compute(self, rates: Sequence[Expression]) -> None:
         """Write the recurrences of the rates; this also requests the series of the state that they need."""
-        self.values = [self.block.coefficient(rate) for rate in rates]
+        self.values = [self._lanes(rate) for rate in rates]
+
+    def _lanes(self, rate: Expression) -> Any:
+        """The coefficient of a rate; one without any vector, zero, is no register by itself."""
+        value = self.block.coefficient(rate)
+        return value if mentions(rate, self.block.own) else call("four_times", value)
 
     @property
     def columns(self) -> int:
         """Number of columns that four tangent vectors need."""
-        return NARROW * (self.components + sum(map(len, self.block.blocks.values())))
-
-    def first(self) -> list[Statement]:
-        """Statements for order zero, and for order one of the vectors themselves."""
-        later = [self._later(1, i, value) for i, value in enumerate(self.values)]
-        return [
-            do("spread_tangents", get("x"), self.components, OUT, VECTORS, self.columns),
-            *self._each([*self.block.first, *later]),
-        ]
-
-    def higher(self) -> list[Statement]:
-        """Statements for order ``o``, and for order ``o + 1`` of the vectors themselves."""
-        block, sums = self.block, list[Statement]()
-        for i, (left, rights) in enumerate(block.blocks.items()):
-            names = several([block.inner(i, place) for place in range(len(rights))])
-            widths = NARROW * len(rights), WIDE
-            sums.append(put(names, call("convolved", OUT, o, 1, left, block.beside(i, 0), *widths)))
-        scale = get("later")
-        later = [self._later(o + 1, i, scale * value) for i, value in enumerate(self.values)]
-        statements = self._each([*sums, *block.higher, *later])
-        return below_highest([put(scale, 1.0 / (o + 1)), *statements])
-
-    def _later(self, order: Any, place: int, value: Any) -> Statement:
-        return do("store", OUT, order, get("v") + NARROW * place, value)
-
-    def _each(self, statements: Iterable[Statement]) -> list[Statement]:
-        """Repeat the statements for all vectors, four at a time."""
-        start = put(get("v"), VECTORS + get("g") * self.columns)
-        return [loop("g", 0, GROUPS, [start, *statements])]
+        return self._begins()[-1]
 
     def places(self) -> dict[str, int]:
         """By name: where the operands of products with a common factor begin, counted from ``v``."""
-        found, place = {}, NARROW * self.components
-        for i, rights in enumerate(self.block.blocks.values()):
-            found[f"{self.block.prefix}b{i}"] = place
-            place += NARROW * len(rights)
+        return {f"{self.block.prefix}b{i}": begin for i, begin in enumerate(self._begins()[:-1])}
+
+    def statements(self) -> list[Statement]:
+        """The series of all vectors, four at a time."""
+        block, scale = self.block, get("later")
+        start = [put(get("v"), VECTORS + get("g") * self.columns), put(o, 0)]
+        start += [put(name, call("load", OUT, 0, get("v") + NARROW * i)) for i, name in enumerate(self.names)]
+        start += [put(name, call("four_times", 0.0)) for letter in "tu" for name in self._products(letter)]
+        first = [*block.first, *self._rows(), *self._step(1, 1.0)]
+        higher = [
+            put(scale, reciprocal(o + 1)),
+            *self._sums(),
+            *block.higher,
+            *self._rows(),
+            *self._step(o + 1, scale),
+        ]
+        return [
+            do("spread_tangents", get("x"), len(self.names), OUT, VECTORS, self.columns),
+            loop("g", 0, GROUPS, [*start, *first, loop("o", 1, ORDER, higher)]),
+        ]
+
+    def _begins(self) -> list[int]:
+        """Where the operands of each common factor begin, and the end; all begin on the widest registers."""
+        found = [padded(NARROW * len(self.names), WIDE)]
+        for rights in self.block.blocks.values():
+            found.append(found[-1] + padded(NARROW * len(rights), WIDE))
+        return found
+
+    def _products(self, letter: str) -> list[Code]:
+        return [get(f"{self.block.prefix}{letter}{i}") for i in range(len(self.block.pairs))]
+
+    def _sums(self) -> list[Statement]:
+        """The sums of all products but for the terms with this order of the vectors; those of later orders.
+
+        All orders of the other factors are known, so only the newest orders of the vectors are missing.
+        """
+        block, found, onwards = self.block, list[Statement](), list[Statement]()
+        places = ((left, i, k) for i, left in enumerate(block.blocks) for k in range(len(block.blocks[left])))
+        t, u, p = map(self._products, "tup")
+        for k, (left, *place) in enumerate(places):
+            found.append(put(block.inner(*place), t[k] + at("out", 1, left) * p[k]))
+            onwards.append(put(t[k], u[k] + at("out", 2, left) * p[k]))
+        begun, k = list[Statement](), 0
+        for blocks in self._together():
+            names = slice(k, k + sum(len(rights) for _, _, rights in blocks))
+            lefts = several([left for _, left, _ in blocks])
+            begins = several([block.beside(i, 0) for i, _, _ in blocks])
+            widths = several([NARROW * len(rights) for _, _, rights in blocks])
+            sums = call("convolved", OUT, o + 1, lefts, begins, widths, 1)
+            begun.append(put(several(t[names] + u[names]), sums))
+            k = names.stop
+        return [*found, *in_turn([when(less(o + 1, ORDER), begun)], onwards)] if found else []
+
+    def _together(self) -> list[list[tuple[int, Any, list[Expression]]]]:
+        """The blocks that are summed in one loop: all of them, or each alone.
+
+        Those of large systems repeat, and become a loop themselves.
+        """
+        blocks = [(i, *each) for i, each in enumerate(self.block.blocks.items())]
+        if self._is_small:
+            return [blocks] if blocks else []
+        return [[each] for each in blocks]
+
+    @property
+    def _is_small(self) -> bool:
+        return len(self.block.pairs) <= AT_HAND
+
+    def _rows(self) -> list[Statement]:
+        """Write the operands of this order, and keep them: to read what was just written takes long."""
+        block, found = self.block, list[Statement]()
+        kept = iter(self._products("p"))
+        for i, (left, rights) in enumerate(block.blocks.items()):
+            names = [next(kept) for _ in rights]
+            found += [put(name, block.pairs[left, right]) for name, right in zip(names, rights, strict=True)]
+            if self._is_small:
+                found.append(do("store_row", OUT, o, block.beside(i, 0), several(names)))
+            else:
+                found += [do("store", OUT, o, block.beside(i, k), name) for k, name in enumerate(names)]
+        return found
+
+    def _step(self, order: Any, scale: Any) -> list[Statement]:
+        """The vectors of an order from their rates in the order before."""
+        rates = [get(f"{self.block.prefix}r{i}") for i in range(len(self.names))]
+        found = [put(*each) for each in zip(rates, self.values, strict=True)]
+        for i, (name, rate) in enumerate(zip(self.names, rates, strict=True)):
+            found += [put(name, scale * rate), do("store", OUT, order, get("v") + NARROW * i, name)]
         return found

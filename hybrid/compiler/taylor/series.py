@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from hybrid.compiler.statements.code import Code, Statement, at, call, do, either, equal, get, put
+from hybrid.compiler.statements.code import Code, Statement, at, call, either, equal, get, put
 from hybrid.compiler.statements.values import Constants, assignments, root_power
 from hybrid.compiler.taylor.sums import Term, added
 from hybrid.expression import operations as ops
@@ -33,6 +33,8 @@ OWN_SQUARE = {ops.Tanh: -1, ops.Tan: 1}
 MOST_TERMS = 4
 # The order of a coefficient, the matrix of all coefficients, and the reciprocal of the order.
 o, OUT, shrink = map(get, ("o", "out", "shrink"))
+# The highest order.
+ORDER = get("order")
 # The coefficients of time from the first on.
 ONE_THEN_ZERO = either(equal(o, 1), 1.0, 0.0)
 
@@ -46,14 +48,13 @@ class Recurrences:
 
     The coefficient of order ``o`` of an expression is a local variable or an entry ``out[o, column]``.
     ``first`` are the statements for order zero, ``higher`` those for the others, which follow in a loop over
-    ``o``. Convolutions are split. The terms at both ends contain coefficients of this order. All terms
-    between contain only lower orders, so they are summed early, all convolutions side by side, and those with
-    the order before come last. ``pairs`` lists these convolutions: the column of the first factor and the
-    second factor, with the code of the second factor's coefficient. In every sum, the term known last is
-    added last, so that only one addition waits for it.
+    ``o``. Convolutions are split (``hybrid.compiler.taylor.convolutions``): the terms at both ends contain
+    coefficients of this order, all others are summed before. ``pairs`` lists the convolutions: the column of
+    the first factor and the second factor, with the code of the second factor's coefficient. ``led`` has
+    those whose first factor is a component, with its code: that end is known before ``higher``. In every sum,
+    the term known last is added last, so that only one addition waits for it.
 
-    With ``lanes``, a coefficient holds four numbers, one per tangent vector, in four columns. The four are
-    written and read as one vector, which is fast even right after the order before was written. ``blocks``
+    With ``lanes``, a coefficient holds four numbers, one per tangent vector, in one register. ``blocks``
     lists the factors that multiply a scalar factor, by the column of the scalar factor.
 
     Parameters
@@ -99,8 +100,11 @@ class Recurrences:
         # The place of each pair, or, with lanes, of each block and of each factor in it.
         self.places: dict[Any, int] = {}
         self.blocks: dict[Any, list[Expression]] = {}
+        self.led: dict[tuple[Any, Expression], Any] = {}
         self.variables: dict[Expression, Any] = {}
         self.slopes: dict[Expression, int] = {}
+        # By column: the variable that holds its newest entry.
+        self.held: dict[Any, Code] = {}
         self.shared: Counter[Expression] = Counter()
         self.lateness: dict[Expression, int] = {}
         self.readiness: dict[Expression, tuple[int, int]] = {}
@@ -126,7 +130,7 @@ class Recurrences:
         if expression in self.variables:
             return self.variables[expression]
         if expression in self.rows:
-            return self.at(o, self.rows[expression])
+            return at("out", o, self.rows[expression])
         if self._is_known(expression):
             return self._known_coefficient(expression)
         if self._is_constant(expression):
@@ -143,20 +147,21 @@ class Recurrences:
         value = self.coefficient(expression)
         if expression not in self.rows:
             self.rows[expression] = self.allot()
-            self._both(self.put(self.rows[expression], value))
+            self._both(put(at("out", o, self.rows[expression]), value))
         return self.rows[expression]
-
-    def at(self, order: Any, column: Any) -> Code:
-        """An entry of a column of these recurrences."""
-        return call("load", OUT, order, column) if self.lanes else at("out", order, column)
-
-    def put(self, column: Any, value: Any) -> Statement:
-        """Statement that writes an entry of order ``o`` of a column of these recurrences."""
-        return do("store", OUT, o, column, value) if self.lanes else put(at("out", o, column), value)
 
     def inner(self, *place: int) -> Code:
         """The convolution of a pair without both ends; with lanes, of a block and a place in it."""
         return get(f"{self.prefix}s{'_'.join(map(str, place))}")
+
+    def newest(self, column: Any) -> Code:
+        """The entry of order ``o`` of a column, from a variable if one holds it."""
+        if column in self.held:
+            return self.held[column]
+        for expression, place in self.rows.items():
+            if place == column and expression in self.variables:
+                return self.variables[expression]
+        return at("out", o, column)
 
     def beside(self, *place: int) -> Code:
         """The column of the second factor of a pair; with lanes, of a block and a place in it."""
@@ -169,8 +174,7 @@ class Recurrences:
 
     def _known_coefficient(self, expression: Expression) -> Code:
         assert self.known is not None
-        row = self.known.row(expression)
-        return self.known.variables.get(expression, at("out", o, row))
+        return at("out", o, self.known.row(expression))
 
     def _is_constant(self, expression: Expression) -> bool:
         return not mentions(expression, self.own) and (
@@ -202,7 +206,7 @@ class Recurrences:
 
     def _store(self, *expressions: Expression) -> None:
         for expression in expressions:
-            self._both(self.put(self.rows[expression], self.variables[expression]))
+            self._both(put(at("out", o, self.rows[expression]), self.variables[expression]))
 
     def _place(self, left: Any, right: Expression) -> tuple[Code, Code]:
         """A convolution with the column ``left``, without both ends, and the column of the other factor."""
@@ -227,22 +231,17 @@ class Recurrences:
         """The results of ``_place`` and the coefficient of the other factor, written to its column."""
         value = self.coefficient(right)
         inner, column = self._place(left, right)
-        self._enter(left, right, column, value)
+        self.pairs[left, right] = value
         return inner, column, value
-
-    def _enter(self, left: Any, right: Expression, column: Any, value: Any) -> None:
-        """Give a convolution the coefficient of its other factor; all pairs are written together."""
-        if self.lanes:
-            self._both(self.put(column, value))
-        else:
-            self.pairs[left, right] = value
 
     def _slope(self, u: Expression) -> int:
         """Column of ``o`` times the coefficients of ``u``: those of the derivative, shifted by one order."""
         if u not in self.slopes:
             value = self.coefficient(u)
             self.slopes[u] = self.allot()
-            self._both(put(at("out", o, self.slopes[u]), o * value))
+            name = self.held[self.slopes[u]] = get(f"{self.prefix}g{len(self.slopes)}")
+            self._both(put(name, o * value))
+            self._both(put(at("out", o, self.slopes[u]), name))
         return self.slopes[u]
 
     def _operation(self, expression: Expression) -> Any:
@@ -364,8 +363,13 @@ class Recurrences:
         left = self.row(a)
         factor = self._known_coefficient(a) if self._is_known(a) else self.coefficient(a)
         inner, right, value = self._beside(left, b)
-        ends = factor * self.at(0, right), at("out", 0, left) * value
-        return self._bind(expression, factor * value, inner + ends[0] + ends[1])
+        if not self.lanes:
+            # Time is a symbol too, but its coefficient becomes known only in ``higher``.
+            if a.is_symbol and a in self.variables and not (self.time and a == self.time[0]):
+                self.led[left, b] = factor
+            else:
+                inner = inner + factor * at("out", 0, right)
+        return self._bind(expression, factor * value, inner + at("out", 0, left) * value)
 
     def _quotient(self, expression: Expression, above: Expression | None, below: Expression) -> Code:
         dividend = None if above is None else self.coefficient(above)
@@ -377,7 +381,7 @@ class Recurrences:
         inner = inner if dividend is None else inner - dividend
         first = (1.0 if dividend is None else dividend) / value
         self._bind(expression, first, (inner + value * at("out", 0, column)) * self._divisor(name))
-        self._enter(divisor, expression, column, name)
+        self.pairs[divisor, expression] = name
         return name
 
     def _power(self, expression: Expression) -> Code:
@@ -394,14 +398,14 @@ class Recurrences:
         u, slope, k = self.row(base), self._slope(base), self.constants.name(exponent)
         value = self.coefficient(base)
         inner, column = self._place(u, expression)
-        moving, copy = self._place(slope, expression)
+        moving, _ = self._place(slope, expression)
         name, column = self._kept(expression, column)
         self.first.append(put(self._divisor(name), 1.0 / value))
         whole = moving + at("out", o, slope) * at("out", 0, column)
         higher = (k * whole + moving - o * inner) * shrink * self._divisor(name)
         self._bind(expression, root_power(value, exponent, k), higher)
-        self._enter(u, expression, column, name)
-        self._enter(slope, expression, copy, name)
+        self.pairs[u, expression] = name
+        self.pairs[slope, expression] = name
         return name
 
     def _rate(self, u: Expression) -> Any:
@@ -425,7 +429,7 @@ class Recurrences:
         inner, column = self._place(slope, expression)
         name, column = self._kept(expression, column)
         self._bind(expression, first, _integrated(inner, slope, column))
-        self._enter(slope, expression, column, name)
+        self.pairs[slope, expression] = name
         return name
 
     def _pair(self, expression: Expression) -> Any:
@@ -450,8 +454,8 @@ class Recurrences:
         if rate is not None:
             self._store(s, c)
         else:
-            self._enter(slope, s, s_column, s_name)
-            self._enter(slope, c, c_column, c_name)
+            self.pairs[slope, s] = s_name
+            self.pairs[slope, c] = c_name
         return self.variables[expression]
 
     def _table(self, expression: Tabulated, rate: Expression) -> Code:
@@ -474,14 +478,14 @@ class Recurrences:
         moving, slope_column = self._place(rate, slope)
         name, row = self._kept(expression)
         slope_name, _ = self._kept(slope, slope_column)
-        inner, copy = self._place(row, expression)
+        inner, _ = self._place(row, expression)
         self.first.append(put(name, call(expression.code, argument)))
         self.higher.append(put(name, _integrated(moving, rate, slope_column)))
         self._store(expression)
-        self._enter(row, expression, copy, name)
+        self.pairs[row, expression] = name
         self.first.append(put(slope_name, 1.0 + float(sign) * name * name))
         self.higher.append(put(slope_name, float(sign) * (inner + 2.0 * at("out", 0, row) * name)))
-        self._enter(rate, slope, slope_column, slope_name)
+        self.pairs[rate, slope] = slope_name
         return name
 
     def _by_derivative(self, expression: Expression) -> Code:

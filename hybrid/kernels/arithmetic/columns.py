@@ -30,47 +30,71 @@ from hybrid.kernels.types.numba_door.building import (
 )
 
 
-def convolve(series, order, inset, left, first, width, widest):
-    """Sums of ``series[j, left] * series[order - j, c]`` over ``inset <= j <= order - inset``.
+def convolve(series, order, left, first, width):
+    """Begin the convolutions of ``order``, which is odd, and of the next order.
 
-    The sums go into ``series[order, c]`` for ``width`` columns ``c`` from ``first`` on; ``width`` is a
-    multiple of 4. No register is wider than ``widest``. ``width`` and ``widest`` are known at compile time.
-    The terms left out at both ends have the coefficients of the highest orders.
+    Sums of ``series[k - j, left] * series[j, c]`` go into ``series[k, c]``, for both orders ``k`` and for
+    ``width`` columns ``c`` from ``first`` on. They have all terms with ``j <= order - 2`` and with
+    ``2 <= k - j <= order - 2``: no row from ``order - 1`` on is read. ``width`` is a multiple of 4, which the
+    compiler knows.
     """
-    sums = convolved(series, order, inset, left, first, width, widest)
-    series[order, first : first + width] = np.concatenate(sums)
+    _write(series, order, first, convolved(series, order, [left], [first], [width], known=0))
 
 
-def convolved(series, order, inset, left, first, width, widest):
-    """The sums of ``convolve`` as registers of four numbers; nothing is written."""
-    sums = np.zeros(width)
-    for j in range(inset, order - inset + 1):
-        sums += series[j, left] * series[order - j, first : first + width]
-    return [sums[place : place + NARROW] for place in range(0, width, NARROW)]
-
-
-def convolve_pairs(series, order, inset, left, first, width, widest):
+def convolve_pairs(series, order, left, first, width):
     """As ``convolve``, but each column has its own factor: the factors begin at column ``left``."""
-    sums = np.zeros(width)
-    for j in range(inset, order - inset + 1):
-        sums += series[j, left : left + width] * series[order - j, first : first + width]
-    series[order, first : first + width] = sums
+    _write(series, order, first, convolved_pairs(series, order, [left], [first], [width], known=0))
 
 
-def add_ends(series, order, left, first, width, widest):
-    """Add the first and the last term to the sums of ``convolve`` with ``inset`` 1 that were begun with 2."""
-    sums = series[1, left] * series[order - 1, first : first + width]
-    if order > 2:
-        sums = sums + series[order - 1, left] * series[1, first : first + width]
-    series[order, first : first + width] += sums
+def convolved(series, order, lefts, firsts, widths, known):
+    """The sums of ``convolve`` as registers of four numbers, those of ``order`` first; nothing is written.
+
+    There are several blocks of columns, each with its own factor. If the factors are ``known``, their rows
+    are complete: ``0 <= j <= order - 2`` for both orders.
+    """
+    return _sums(series, order, lefts, firsts, widths, known, lambda width: slice(0, 1))
 
 
-def add_ends_of_pairs(series, order, left, first, width, widest):
+def convolved_pairs(series, order, lefts, firsts, widths, known):
+    """The sums of ``convolve_pairs`` as registers of four numbers."""
+    return _sums(series, order, lefts, firsts, widths, known, lambda width: slice(0, width))
+
+
+def _sums(series, order, lefts, firsts, widths, known, columns):
+    registers = []
+    for k in (order, order + 1):
+        for left, first, width in zip(lefts, firsts, widths, strict=True):
+            sums = np.zeros(width)
+            for j in range(0 if known else 2 + k - order, order - 1):
+                sums += series[k - j, left:][columns(width)] * series[j, first : first + width]
+            registers += [sums[place : place + NARROW] for place in range(0, width, NARROW)]
+    return registers
+
+
+def _write(series, order, first, registers):
+    half = len(registers) // 2
+    for k, fours in enumerate((registers[:half], registers[half:])):
+        series[order + k, first : first + NARROW * half] = np.concatenate(fours)
+
+
+def add_ends(series, order, distance, left, first, width):
+    """Add to the sums of ``convolve`` the two terms in which a factor has the order ``distance``.
+
+    If both factors have, the two terms are one.
+    """
+    _add_ends(series, order, distance, slice(left, left + 1), slice(first, first + width))
+
+
+def add_ends_of_pairs(series, order, distance, left, first, width):
     """As ``add_ends``, for the sums of ``convolve_pairs``."""
-    sums = series[1, left : left + width] * series[order - 1, first : first + width]
-    if order > 2:
-        sums = sums + series[order - 1, left : left + width] * series[1, first : first + width]
-    series[order, first : first + width] += sums
+    _add_ends(series, order, distance, slice(left, left + width), slice(first, first + width))
+
+
+def _add_ends(series, order, distance, factors, columns):
+    sums = series[distance, factors] * series[order - distance, columns]
+    if order > 2 * distance:
+        sums = sums + series[order - distance, factors] * series[distance, columns]
+    series[order, columns] += sums
 
 
 def evaluate(series, order, s, first, width):

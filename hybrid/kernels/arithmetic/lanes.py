@@ -65,6 +65,11 @@ def load(matrix, row, column):
     return matrix[row, column : column + NARROW].copy()
 
 
+def four(a, b, c, d):
+    """Four numbers side by side."""
+    return np.array([a, b, c, d])
+
+
 def store(matrix, row, column, lanes):
     """Write four entries of a row, from a register or from one number for all."""
     matrix[row, column : column + NARROW] = lanes
@@ -76,7 +81,8 @@ def store_down(matrix, row, column, stride, lanes):
 
 
 def store_row(matrix, row, column, numbers):
-    """Write a tuple of numbers side by side, in registers padded with zeros."""
+    """Write a tuple of numbers side by side, in registers padded with zeros; or registers of four numbers."""
+    numbers = np.concatenate([np.atleast_1d(each) for each in numbers])
     filled = sum(widths(len(numbers)))
     matrix[row, column : column + filled] = [*numbers, *[0.0] * (filled - len(numbers))]
 

@@ -1,15 +1,19 @@
 """LLVM's instructions for series side by side in vector registers (``hybrid.kernels.arithmetic.columns``)."""
 
-from llvmlite import ir
-
 from hybrid.kernels.instructions.loops import loop, variable
-from hybrid.kernels.instructions.registers import NUMBER, everywhere, multiply_add, read, vector_of, write
+from hybrid.kernels.instructions.registers import (
+    NUMBER,
+    everywhere,
+    multiply_add,
+    parted,
+    read,
+    vector_of,
+    write,
+)
 from hybrid.kernels.types.codes import NARROW, WIDE
 
-# Number of partial sums: in one sum, each term waits for the previous term. All sums together take at most
-# this many of the sixteen registers of four numbers.
-AT_ONCE = 4
-MOST_REGISTERS = 12
+# In one sum, each term waits for the previous term: so there are two partial sums, of even and odd rows.
+PARTS = 2
 
 
 def _registers(width, widest):
@@ -19,71 +23,91 @@ def _registers(width, widest):
     return wide + [(place, NARROW) for place in range(whole, width, NARROW)]
 
 
-def write_convolution(builder, rows, order, inset, left, first, width, widest, pairs=False):
+def write_convolution(builder, rows, order, left, first, width, pairs=False):
     """The instructions of ``convolve``, or of ``convolve_pairs``."""
-    target = rows.address(order, first)
-    for place, total in _convolution(builder, rows, order, inset, left, first, width, widest, pairs):
-        write(builder, total, rows.beside(target, place))
-
-
-def write_convolved(builder, rows, order, inset, left, first, width, widest):
-    """The instructions of ``convolved``; returns the registers."""
-    found = []
-    for _, total in _convolution(builder, rows, order, inset, left, first, width, widest, False):
-        for lane in range(0, total.type.count, NARROW):
-            lanes = ir.Constant(ir.VectorType(ir.IntType(32), NARROW), list(range(lane, lane + NARROW)))
-            found.append(builder.shuffle_vector(total, total.type(ir.Undefined), lanes))
-    return found
-
-
-def _convolution(builder, rows, order, inset, left, first, width, widest, pairs):
-    """The instructions for the sums of a convolution; yields each register with its first column."""
-    registers = _registers(width, widest)
-    sums_at_once = AT_ONCE
-    while sums_at_once > 1 and sums_at_once * width > MOST_REGISTERS * NARROW:
-        sums_at_once //= 2
     number = order.type
-    # Start with the lowest orders of the columns: the orders written last are the slowest to read.
-    factor = rows.walker(builder.sub(order, inset), left)
-    other = rows.walker(inset, first)
-    totals = [
-        [variable(builder, vector_of(each)([0.0] * each)) for _, each in registers]
-        for _ in range(sums_at_once)
-    ]
-
-    def add_term(row_of_totals):
-        a, b = rows.walk(factor, -1), rows.walk(other, 1)
-        for (place, each), total in zip(registers, row_of_totals, strict=True):
-            term = read(builder, rows.beside(b, place), each)
-            if pairs:
-                times = read(builder, rows.beside(a, place), each)
-            else:
-                times = everywhere(builder, builder.load(a, typ=NUMBER), each)
-            builder.store(multiply_add(builder, times, term, builder.load(total)), total)
-
-    terms = builder.add(builder.sub(order, builder.add(inset, inset)), number(1))
-    terms = builder.select(builder.icmp_signed(">", terms, number(0)), terms, number(0))
-    with loop(builder, number(0), builder.udiv(terms, number(sums_at_once)), number(1)):
-        for each in totals:
-            add_term(each)
-    if sums_at_once > 1:
-        with loop(builder, number(0), builder.urem(terms, number(sums_at_once)), number(1)):
-            add_term(totals[0])
-    for i, (place, _) in enumerate(registers):
-        parts = [builder.load(each[i]) for each in totals]
-        while len(parts) > 1:
-            parts = [builder.fadd(*parts[j : j + 2]) for j in range(0, len(parts), 2)]
-        yield place, parts[0]
+    targets = [rows.address(each, first) for each in (order, builder.add(order, number(1)))]
+    for _, place, sums in _convolution(builder, rows, order, [(left, first, width)], False, pairs):
+        for target, total in zip(targets, sums, strict=True):
+            write(builder, total, rows.beside(target, place))
 
 
-def write_ends(builder, rows, order, left, first, width, widest, pairs=False):
+def write_convolved(builder, rows, order, lefts, firsts, sizes, known, pairs=False):
+    """The instructions of ``convolved``, or of ``convolved_pairs``; returns the registers."""
+    blocks = [*zip(lefts, firsts, sizes, strict=True)]
+    of_order, of_next = [], []
+    for *_, sums in _convolution(builder, rows, order, blocks, known, pairs):
+        of_order += parted(builder, sums[0])
+        of_next += parted(builder, sums[1])
+    return of_order + of_next
+
+
+def _convolution(builder, rows, order, blocks, known, pairs):
+    """The instructions for the sums of convolutions of two orders.
+
+    Yields, for each register, the number of its block, its first column there, and the two sums.
+    """
+    widest, room = builder.vectors
+    waiting = [(i, *each) for i, (_, _, width) in enumerate(blocks) for each in _registers(width, widest)]
+    while waiting:
+        # As many as have room in the registers: two orders in parts, and two factors.
+        count, needed, seen = 0, 0, set()
+        for i, place, _ in waiting:
+            factor = (i, place) if pairs else i
+            needed += 2 * PARTS + (0 if factor in seen else 2)
+            seen.add(factor)
+            if count and needed > room:
+                break
+            count += 1
+        yield from _sums_at_once(builder, rows, order, blocks, waiting[:count], known, pairs)
+        waiting = waiting[count:]
+
+
+def _sums_at_once(builder, rows, order, blocks, registers, known, pairs):
+    """One loop over the rows: each row is read once for both orders, since reading takes most of the time."""
+    number = order.type
+    begin, one = number(0 if known else 2), number(1)
+    used = sorted({i for i, _, _ in registers})
+    factors = {i: rows.walker(builder.sub(order, begin), blocks[i][0]) for i in used}
+    others = {i: rows.walker(begin, blocks[i][1]) for i in used}
+
+    def factors_at(addresses):
+        if pairs:
+            return [read(builder, rows.beside(addresses[i], place), width) for i, place, width in registers]
+        singles = {i: builder.load(address, typ=NUMBER) for i, address in addresses.items()}
+        spread = {(i, width): everywhere(builder, singles[i], width) for i, _, width in registers}
+        return [spread[i, width] for i, _, width in registers]
+
+    nothing = [vector_of(width)([0.0] * width) for *_, width in registers]
+    # The factor that the next order has where this order has the one of the row before.
+    before = nothing
+    if known:
+        before = factors_at({i: rows.address(builder.add(order, one), blocks[i][0]) for i in used})
+    before = [variable(builder, each) for each in before]
+    totals = [[[variable(builder, each) for each in nothing] for _ in range(2)] for _ in range(PARTS)]
+    terms = builder.sub(builder.sub(order, one), begin)
+    with loop(builder, number(0), builder.ashr(terms, one), one):
+        for this, next_one in totals:
+            sources = {i: rows.walk(other, 1) for i, other in others.items()}
+            newer = factors_at({i: rows.walk(factor, -1) for i, factor in factors.items()})
+            for k, (i, place, width) in enumerate(registers):
+                term = read(builder, rows.beside(sources[i], place), width)
+                for total, factor in ((this[k], newer[k]), (next_one[k], builder.load(before[k]))):
+                    builder.store(multiply_add(builder, factor, term, builder.load(total)), total)
+                builder.store(newer[k], before[k])
+    for k, (i, place, _) in enumerate(registers):
+        parts = [[builder.load(part[which][k]) for part in totals] for which in range(2)]
+        yield i, place, [builder.fadd(*each) for each in parts]
+
+
+def write_ends(builder, rows, order, distance, left, first, width, pairs=False):
     """The instructions of ``add_ends``, or of ``add_ends_of_pairs``."""
     number = order.type
-    below = builder.sub(order, number(1))
-    differ = builder.icmp_signed(">", order, number(2))
-    here, one, last = (rows.address(row, first) for row in (order, number(1), below))
-    left_one, left_last = (rows.address(row, left) for row in (number(1), below))
-    for place, lanes in _registers(width, widest):
+    near, far = number(distance), builder.sub(order, number(distance))
+    differ = builder.icmp_signed(">", order, number(2 * distance))
+    here, one, last = (rows.address(row, first) for row in (order, near, far))
+    left_one, left_last = (rows.address(row, left) for row in (near, far))
+    for place, lanes in _registers(width, builder.vectors.widest):
         nothing = vector_of(lanes)([0.0] * lanes)
         if pairs:
             low, high = (read(builder, rows.beside(each, place), lanes) for each in (left_one, left_last))

@@ -1,5 +1,7 @@
 """LLVM's instructions for numbers side by side in vector registers."""
 
+from typing import NamedTuple
+
 from llvmlite import ir
 
 from hybrid.kernels.instructions.loops import declared, variable
@@ -7,6 +9,13 @@ from hybrid.kernels.types.codes import NARROW, WIDE
 
 FUSED = ("contract",)
 NUMBER = ir.DoubleType()
+
+
+class Vectors(NamedTuple):
+    """The vector registers of a processor: numbers in the widest one, and how many of them sums may fill."""
+
+    widest: int
+    room: int
 
 
 def vector_of(width):
@@ -20,6 +29,11 @@ def everywhere(builder, number, width):
     vector = builder.insert_element(nothing, number, ir.IntType(32)(0))
     lanes = ir.VectorType(ir.IntType(32), width)
     return builder.shuffle_vector(vector, nothing, lanes([0] * width))
+
+
+def lane_numbers(first, count):
+    """Consecutive numbers of lanes, which shuffles choose."""
+    return ir.Constant(ir.VectorType(ir.IntType(32), count), list(range(first, first + count)))
 
 
 def built_in(builder, name, width, *arguments):
@@ -87,17 +101,36 @@ def write_down(builder, matrix, row, column, stride, lanes):
 
 
 def write_row(builder, matrix, row, column, numbers):
-    """The instructions of ``store_row``.
+    """The instructions of ``store_row``, of numbers or of registers of four numbers.
 
-    A processor stalls when it reads as one register what has just been written as two.
+    A processor stalls when it reads as one register what has just been written as two. So a row is written
+    in registers as wide as those in which ``convolved`` reads it.
     """
-    address = matrix.address(row, column)
-    for place in range(0, sum(widths(len(numbers))), NARROW):
-        vector = vector_of(NARROW)([0.0] * NARROW)
-        for lane, value in enumerate(numbers[place : place + NARROW]):
-            vector = builder.insert_element(vector, value, ir.IntType(32)(lane))
+    if numbers[0].type == NUMBER:
+        numbers = [*numbers, *[NUMBER(0.0)] * (sum(widths(len(numbers))) - len(numbers))]
+        numbers = [four(builder, *numbers[i : i + NARROW]) for i in range(0, len(numbers), NARROW)]
+    address, place = matrix.address(row, column), 0
+    for width in widths(NARROW * len(numbers)):
+        parts = numbers[place // NARROW : (place + width) // NARROW]
+        vector = parts[0] if len(parts) == 1 else builder.shuffle_vector(*parts, lane_numbers(0, width))
         target = _address_of(builder, matrix.beside(address, place), vector.type)
         builder.store(vector, target, align=8, whole=True)
+        place += width
+
+
+def four(builder, *numbers):
+    """The instructions of ``four``."""
+    vector = vector_of(NARROW)([0.0] * NARROW)
+    for lane, value in enumerate(numbers):
+        vector = builder.insert_element(vector, value, ir.IntType(32)(lane))
+    return vector
+
+
+def parted(builder, vector):
+    """The registers of four numbers that a register holds."""
+    nothing, count = vector.type(ir.Undefined), vector.type.count
+    places = [lane_numbers(lane, NARROW) for lane in range(0, count, NARROW)]
+    return [vector] if count == NARROW else [builder.shuffle_vector(vector, nothing, each) for each in places]
 
 
 def whole_registers(width, register):

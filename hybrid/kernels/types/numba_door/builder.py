@@ -55,6 +55,8 @@ class Builder(ir.IRBuilder):
     """A builder of llvmlite that writes the most common instructions as lines of text."""
 
     count = 0
+    # The vector registers of the processor that code is written for.
+    vectors: Any = None
 
     def written(self, kind: Any, text: str) -> Line:
         """Add an instruction whose value has this type."""

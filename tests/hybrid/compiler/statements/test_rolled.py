@@ -115,7 +115,12 @@ class Writer:
                 ),
                 lambda i: do("store", OUT, *four(i), get(f"a{mark}_{i}") + get(f"b{mark}_{i}")),
             ],
-            [lambda i: put(pair(i), call("convolved", OUT, 2, 1, left(i), FOUR + 4 * left(i), 8, 8))],
+            [
+                lambda i: put(
+                    pair(i),
+                    call("convolved", OUT, 1, *map(several, ([left(i)], [FOUR + 4 * left(i)], [4])), 1),
+                )
+            ],
             # Variables that only one statement reads.
             [
                 lambda i: put(get(f"u{mark}_{i}"), number(i)),

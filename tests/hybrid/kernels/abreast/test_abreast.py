@@ -9,6 +9,8 @@ import hybrid
 import lyapunov
 import models
 from hybrid import Every, Guard, HybridSystem, Mode, Reset, Transition, simulate, simulate_many
+from hybrid.simulation.crew import together
+from hybrid.simulation.plan import plan_of
 from tests.models.test_laws import RUNS
 
 # Where the end of a run is this sensitive to its start, rounding is not told from a mistake.
@@ -49,6 +51,14 @@ def test_many_runs_of_a_model_are_those_of_each(name):
     system, ranges = RUNS[name]
     starts = starts_of(system, ranges, 24)
     assert_same_runs(system, starts, ranges["t_span"])
+
+
+@pytest.mark.parametrize("tangents", [0, 1])
+@pytest.mark.parametrize("name", ["vibroimpact", "impact_oscillator", "bouncing_ball", "bilinear_oscillator"])
+def test_a_plain_model_takes_its_steps_abreast(name, tangents):
+    compiled = hybrid.compile_system(RUNS[name][0])
+    plan = plan_of(compiled, hybrid.Taylor(), tangents)
+    assert together(compiled, plan, tangents).able.all()
 
 
 @settings(max_examples=12)

@@ -4,14 +4,16 @@ import numpy as np
 import pytest
 from numba import njit
 
+from hybrid.compiler.llvm import lowering
 from hybrid.compiler.statements.code import call, do, get, put, several
-from hybrid.compiler.taylor.loops import ORDER, VECTORS
-from hybrid.compiler.taylor.series import OUT
+from hybrid.compiler.taylor.loops import VECTORS
+from hybrid.compiler.taylor.series import ORDER, OUT
 from hybrid.kernels.arithmetic.columns import (
     evaluate,
     evaluate_with_sizes,
     gather_tangents,
 )
+from hybrid.kernels.instructions.registers import Vectors
 from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL
 from hybrid.kernels.types.numba_door.numba_types import signature_of
 from tests.hybrid.code import both
@@ -34,61 +36,99 @@ def pair(columns=44):
     return series, series.copy()
 
 
-def test_convolve():
-    """The widths of a convolution and of its registers are constants of the code, one case per width."""
-    cases = [
-        (width, inset, widest, name)
-        for width in (4, 8, 12, 20, 36)
-        for inset in (1, 2)
-        for widest, name in ((4, "convolve"), (8, "convolve"), (8, "convolve_pairs"))
-    ]
-    bodies = [[do(name, OUT, ORDER, inset, 3, 43, width, widest)] for width, inset, widest, name in cases]
-    interpreted, compiled = both(*bodies, fused=True)
-    for i in range(len(cases)):
-        for order in (1, 2, 3, 4, 7, 28):
-            series, plain = pair(80)
-            interpreted(i, 0.0, NOTHING, NOTHING, order, plain)
-            compiled(i, 0.0, NOTHING, NOTHING, order, series)
-            np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
+def sums_of(series, order, left, first, width, begin, end, pairs=False):
+    """The terms of a convolution from row ``begin`` to row ``end`` of the second factor."""
+    columns = slice(left, left + (width if pairs else 1))
+    terms = [series[order - j, columns] * series[j, first : first + width] for j in range(begin, end + 1)]
+    return sum(terms, np.zeros(width))
 
 
-def test_the_sums_of_a_convolution_as_registers():
-    widths = (4, 8, 12, 20, 36, 60)
-    bodies = []
-    for width in widths:
-        names = {place: get(f"r{place}") for place in range(0, width, 4)}
-        sums = put(several([*names.values()]), call("convolved", OUT, ORDER, 1, 3, 63, width, 8))
-        bodies.append([sums, *(do("store", OUT, ORDER, 63 + place, each) for place, each in names.items())])
-    interpreted, compiled = both(*bodies, fused=True)
+@pytest.mark.parametrize(("name", "pairs"), [("convolve", False), ("convolve_pairs", True)])
+def test_convolve(name, pairs):
+    """The width of a convolution is a constant of the code, one case per width."""
+    widths = (4, 8, 12, 20, 36, 60, 100)
+    runs = both(*([do(name, OUT, ORDER, 3, 103, width)] for width in widths), fused=True)
     for i, width in enumerate(widths):
-        for order in (1, 2, 3, 4, 7, 28):
-            series, plain = pair(124)
-            expected = sum(plain[j, 3] * plain[order - j, 63 : 63 + width] for j in range(1, order))
-            interpreted(i, 0.0, NOTHING, NOTHING, order, plain)
-            compiled(i, 0.0, NOTHING, NOTHING, order, series)
-            np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
-            np.testing.assert_allclose(plain[order, 63 : 63 + width], expected, rtol=1e-13, atol=1e-14)
+        for order in (1, 3, 5, 7, 27):
+            expected, _ = pair(204)
+            for k in (order, order + 1):
+                begin, end = 2 + k - order, order - 2
+                expected[k, 103 : 103 + width] = sums_of(expected, k, 3, 103, width, begin, end, pairs)
+            for run in runs:
+                series, _ = pair(204)
+                run(i, 0.0, NOTHING, NOTHING, order, series)
+                np.testing.assert_allclose(series, expected, rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize(("name", "pairs"), [("convolved", False), ("convolved_pairs", True)])
+@pytest.mark.parametrize("known", [0, 1])
+def test_the_sums_of_convolutions_as_registers(name, pairs, known):
+    """Several blocks of columns, each with its own factor; with all rows of the factors known, or not."""
+    layouts = ([4], [8], [20], [4, 4, 4], [8, 12, 4], [60], [8] * 7)
+    bodies, blocks = [], []
+    for widths in layouts:
+        firsts = [100 + sum(widths[:i]) for i in range(len(widths))]
+        lefts = [3 + 9 * i for i in range(len(widths))]
+        blocks.append((lefts, firsts, widths))
+        count = 2 * sum(widths) // 4
+        names = [get(f"r{place}") for place in range(count)]
+        sums = call(name, OUT, ORDER, several(lefts), several(firsts), several(widths), known)
+        stores = [do("store", OUT, 33, 4 * i, each) for i, each in enumerate(names)]
+        bodies.append([put(several(names), sums), *stores])
+    runs = both(*bodies, fused=True)
+    for i, (lefts, firsts, widths) in enumerate(blocks):
+        for order in (1, 3, 5, 7, 27):
+            series = np.random.default_rng(order).normal(size=(34, 180))
+            expected = [
+                sums_of(series, k, left, first, width, 0 if known else 2 + k - order, order - 2, pairs)
+                for k in (order, order + 1)
+                for left, first, width in zip(lefts, firsts, widths, strict=True)
+            ]
+            expected = np.concatenate(expected)
+            for run in runs:
+                out = series.copy()
+                run(i, 0.0, NOTHING, NOTHING, order, out)
+                np.testing.assert_allclose(out[33, : len(expected)], expected, rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize("vectors", [Vectors(4, 6), Vectors(4, 14), Vectors(8, 30)])
+def test_a_convolution_in_other_registers(vectors, monkeypatch):
+    """The code for a processor with other registers has the same sums."""
+    monkeypatch.setattr(lowering, "vectors", lambda: vectors)
+    test_convolve("convolve_pairs", pairs=True)
+    test_the_sums_of_convolutions_as_registers("convolved", pairs=False, known=1)
 
 
 @pytest.mark.parametrize(
-    ("convolve", "ends"), [("convolve", "add_ends"), ("convolve_pairs", "add_ends_of_pairs")]
+    ("convolve", "ends", "pairs"),
+    [("convolve", "add_ends", False), ("convolve_pairs", "add_ends_of_pairs", True)],
 )
-def test_a_convolution_in_two_parts(convolve, ends):
-    """The terms with the order before are added to the others later."""
+def test_a_convolution_in_parts(convolve, ends, pairs):
+    """The terms with the two orders before are added to the others later."""
     widths = (4, 8, 12, 20, 36)
     bodies = [
-        [do(convolve, OUT, ORDER, 2, 3, 43, width, 8), do(ends, OUT, ORDER, 3, 43, width, 8)]
+        [
+            do(convolve, OUT, ORDER, 3, 43, width),
+            *(do(ends, OUT, order, distance, 3, 43, width) for order, distance in parts),
+        ]
         for width in widths
+        for parts in [((ORDER, 1), (ORDER + 1, 2), (ORDER + 1, 1))]
     ]
-    whole, _ = both([do(convolve, OUT, ORDER, 1, 3, 43, 36, 8)], fused=True)
-    for run in both(*bodies, fused=True):
-        for i, width in enumerate(widths):
-            for order in (2, 3, 4, 7, 28):
-                series, plain = pair(80)
-                whole(0, 0.0, NOTHING, NOTHING, order, plain)
+    runs = both(*bodies, fused=True)
+    for i, width in enumerate(widths):
+        for order in (3, 5, 7, 27):
+            plain, _ = pair(80)
+            for run in runs:
+                series = plain.copy()
                 run(i, 0.0, NOTHING, NOTHING, order, series)
-                both_parts = series[order, 43 : 43 + width]
-                np.testing.assert_allclose(both_parts, plain[order, 43 : 43 + width], rtol=1e-12, atol=1e-13)
+                # The next order has this order at one of its ends, as it was after the first two parts.
+                expected = sums_of(plain, order, 3, 43, width, 1, order - 1, pairs)
+                np.testing.assert_allclose(series[order, 43 : 43 + width], expected, rtol=1e-12, atol=1e-13)
+                plain_with_it = plain.copy()
+                plain_with_it[order, 43 : 43 + width] = expected
+                expected = sums_of(plain_with_it, order + 1, 3, 43, width, 1, order, pairs)
+                found = series[order + 1, 43 : 43 + width]
+                np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13)
 
 
 @pytest.mark.parametrize("width", [4, 8, 12, 20, 36])
