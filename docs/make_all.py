@@ -31,7 +31,11 @@ COMMANDS = {
     "stability": ["-m", "benchmarks.stability"],
 }
 # These take the file of their picture, and draw it only if they are asked to.
-FILES = {"compile_time": "benchmarks.compile_time", "adversarial": "benchmarks.adversarial"}
+FILES = {
+    "abreast": "benchmarks.abreast",
+    "compile_time": "benchmarks.compile_time",
+    "adversarial": "benchmarks.adversarial",
+}
 
 
 def main() -> None:

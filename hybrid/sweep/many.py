@@ -82,7 +82,7 @@ def simulate_many(
     xarray.Dataset
         Over the axis ``start``: ``x0`` and ``x_end`` (axis ``state``), ``t_end``, ``mode_end``, ``jumps``,
         ``status`` and ``message``; with samples also ``x`` (axes ``start``, ``t``, ``state``), nan after the
-        end of a run.
+        end of a run. The attributes tell how many ``steps_together`` and ``steps_alone`` the runs took.
 
     Raises
     ------
@@ -155,6 +155,8 @@ class _Found:
         self.jumps = np.zeros(count, dtype=np.int64)
         self.codes = np.full(count, StatusCode.NOT_RUN, dtype=np.int16)
         self.messages = np.full(count, UNTOUCHED, dtype=object)
+        # Steps that runs took together, and alone.
+        self.steps: list[tuple[int, int]] = []
 
     def tell(self, i: int, status: Status) -> None:
         """Keep how a run ended."""
@@ -179,7 +181,10 @@ class _Found:
         variables["status"] = ("start", self.codes, flags())
         variables["message"] = ("start", self.messages)
         used = {**system.parameters, **parameters}
-        return xarray.Dataset(variables, coords, attributes("ends", system=system, parameters=used))
+        facts = attributes("ends", system=system, parameters=used)
+        together, alone = np.sum(self.steps, axis=0) if self.steps else (0, 0)
+        facts["steps_together"], facts["steps_alone"] = int(together), int(alone)
+        return xarray.Dataset(variables, coords, facts)
 
 
 @attrs.frozen(eq=False)
@@ -276,6 +281,7 @@ class _Runs:
             crew.memory.codes[:] = codes.DONE
             crew.memory.codes[under_way] = codes.GO_ON
             finished = crew.go(onward, CTRL_C)
+            found.steps.append((int(crew.memory.steps), int(crew.memory.alone)))
             now = [int(each.starts.now) for each in jobs]
             if not finished:
                 is_told[
