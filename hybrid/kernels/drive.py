@@ -17,8 +17,10 @@ from hybrid.kernels.events.clocks import (
 )
 from hybrid.kernels.events.guards import (
     guard_value,
+    has_program,
     rounding_band,
 )
+from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.limit.go import may_accumulate
 from hybrid.kernels.steps.field.jumps import leave
 from hybrid.kernels.steps.field.late import is_late
@@ -403,6 +405,26 @@ def prepare(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         return GO_ON, Room(remaining, until, room, knot, clock)
 
 
+@njit(**INLINE)
+def reaches_one_guard(model, run):
+    """Whether a step with one crossing, which is certain, ends at it and may fire no other transition.
+
+    Then its guard is crossed, and nothing else has to be asked.
+    """
+    fired, mode = run.pending, run.mode
+    if fired == NO_TRANSITION or model.conditional[mode] == 1 or model.jumping_reset[fired] == 1:
+        return False
+    if has_program(model, fired):
+        return False
+    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        other = model.outgoing[slot]
+        if other != fired and model.surface[other] == model.surface[fired]:
+            return False
+    run.side[fired] = -run.side[fired]
+    run.on_guard[fired], run.due[fired], run.rehearsal[3, fired] = BY_SPEED, 1, 0
+    return True
+
+
 @njit(**KERNEL)
 def complete(parts, task, room, span, stop_cycle, stop_phase, alone):
     """Count the time of a step, which has moved the state; returns GO_ON, or why the run ends.
@@ -439,10 +461,11 @@ def advance(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
         code, room = prepare(parts, task, stop_cycle, stop_phase, max_steps, max_jumps)
         if code != GO_ON:
             return code
-        task.run.distant = 0
+        task.run.distant = task.run.crossings = 0
         code, span = step(parts, task, room.all)
         if code != GO_ON:
             return int(code)
-        code = complete(parts, task, room, span, stop_cycle, stop_phase, False)
+        alone = task.run.crossings == 1 and reaches_one_guard(task.model, task.run)
+        code = complete(parts, task, room, span, stop_cycle, stop_phase, alone)
         if code != GO_ON:
             return code

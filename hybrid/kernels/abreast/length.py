@@ -113,6 +113,6 @@ def trusted_length(method, sea, n, tangents, start, stride, order, exact):
     regular = both(rise >= LEAST_RISE, rise <= (MOST_RISE_OF_EXACT if exact else MOST_RISE))
     if not exact:
         regular = both(regular, newer - older <= 0.5 * TAIL * last)
-    length = (1.0 if exact else SAFETY) * powers_of_two(-1.0 * last)
+    length = powers_of_two(-1.0 * last - (0.0 if exact else SAFETY / (order - 1)))
     reach = 2.0 ** (MOST_BITS / order)
     return length, both(regular, both(length * reach > 1.0, length < reach))

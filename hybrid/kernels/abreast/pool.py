@@ -6,8 +6,7 @@ from hybrid.kernels.abreast.lanes import ROOM, STEPS, come_aboard, holds_roots, 
 from hybrid.kernels.abreast.rows import bits_of, mask_of
 from hybrid.kernels.abreast.step import step_abreast
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT
-from hybrid.kernels.drive import Room, complete, keep_scale, prepare, remember_scale
-from hybrid.kernels.events.guards import has_program
+from hybrid.kernels.drive import Room, complete, keep_scale, prepare, reaches_one_guard, remember_scale
 from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.guards.touch import forget_touches
 from hybrid.kernels.steps.field.late import is_late
@@ -83,17 +82,7 @@ def take_ashore(sea, task, row):
         span += land(model, run, tangents, fired, path, span, work)
         run.pending = fired
         keep_scale(model, run, on_guard, t + span, work)
-        if is_alone(model, mode, fired):
-            run.side[fired] = -run.side[fired]
-            run.on_guard[fired], run.due[fired], run.rehearsal[3, fired] = BY_SPEED, 1, 0
     return span
-
-
-@njit(**INLINE)
-def is_alone(model, mode, fired):
-    """Whether a crossing that the step has proved fires its transition, and no other comes into question."""
-    certain = model.conditional[mode] == 0 and model.jumping_reset[fired] == 0
-    return certain and not has_program(model, fired)
 
 
 @njit(**KERNEL)
@@ -191,9 +180,8 @@ def go_ashore(parts, sea, crew, mode, row, took, went):
             task.run.unchecked -= 1
             parts.keep_apart(task.model, task.run, mode, task.tangents, task.work.jacobian)
         return r, GO_ON
-    fired = sea.fired[row]
-    alone = fired != NO_TRANSITION and is_alone(task.model, mode, fired)
     span = take_ashore(sea, task, row)
+    alone = reaches_one_guard(task.model, task.run)
     # What is left of a time that ends with the room ends with it to the last bit.
     remains = left + beyond(crew.rooms[r, 0], crew.rooms[r, 2])
     until = left + beyond(crew.rooms[r, 1], crew.rooms[r, 2])

@@ -56,6 +56,8 @@ POWERS = np.array(
 CLEAR, CROSSES, UNKNOWN = range(3)
 # If a part this short is not decided, the whole polynomial is used.
 SHORTEST_PART = 0.2
+# What a crossing counts that is not certain: a guard that is clear of zero on both sides of it is.
+UNCERTAIN = 2
 
 
 @njit(**KERNEL)
@@ -165,11 +167,12 @@ def judge_leading(degree, rest, slope_of_rest, side, band, last, stack):
 @njit(**INLINE)
 def last_terms(series, column, order, h):
     """The sum of the magnitudes of the last terms of a series: more than all that are left out."""
-    power, total = h**order, 0.0
-    for o in range(order, max(order - TAIL_OF_GUARD, 0), -1):
-        total += abs(series[o, column]) * power
-        power /= h
-    return total
+    least, total, power = max(order - TAIL_OF_GUARD, 0) + 1, 0.0, 1.0
+    for o in range(order, least - 1, -1):
+        total = total * h + abs(series[o, column])
+    for _ in range(least):
+        power *= h
+    return total * power
 
 
 @njit(**INLINE)
@@ -282,6 +285,9 @@ def crossing_by_leading(model, run, guard, path, work):
     resolved = seen or is_resolved_by_series(model, run, transition, column, path, guard.on_guard, work)
     bracket = Bracket(start * h, end * h, work.stack[row, 2], work.stack[row, 2 + degree])
     run.rehearsal[3, transition] = side
+    last = series[order + 1, column] if end == 1.0 else work.stack[row, 2 + degree]
+    certain = min(work.stack[row, 2] * side, -last * side) > guard.band + rest
+    run.crossings += 1 if certain and resolved else UNCERTAIN
     return CROSSES, root_between(path, column, guard.known, bracket, side) / h, resolved
 
 
@@ -327,6 +333,7 @@ def crossing_on_series(attempts, model, method, run, transition, column, path, w
             if verdict != UNKNOWN:
                 run.on_guard[transition] = 0
                 return theta, 1.0, resolved
+    run.crossings += UNCERTAIN
     return crossing_by_pieces(attempts, model, method, run, transition, column, path, work)
 
 
@@ -342,6 +349,7 @@ def earliest_on_series(attempts, model, method, run, path, work):
     mode, series, order = run.mode, path.powers, path.degree
     earliest, fired, proved, blurred = NO_ROOT, NO_TRANSITION, 1.0, NO_TRANSITION
     forget_touches(run)
+    run.crossings = 0
     first = model.first_outgoing[mode]
     for slot in range(first, model.first_outgoing[mode + 1]):
         transition, column = model.outgoing[slot], NO_COLUMN

@@ -26,7 +26,8 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 EXACT_TOLERANCE = 1e-17
 # Share of the largest component that serves as absolute tolerance for the others.
 SHARE = 1e-3
-SAFETY = 0.9
+# A step is shorter by so many bits, shared by its orders: the safety factor of Jorba and Zou.
+SAFETY = 0.7 / math.log(2.0)
 # Share of the tolerance for tangent vectors: a stiff contact stretches a vector a thousandfold and shrinks it
 # again, and the error made while the vector is long remains when it is short.
 TANGENT_SHARE = 0.1
@@ -182,7 +183,7 @@ def longest_step(series, columns, order, tolerance, weights):
         older = logarithms_of_terms(series, columns, o, tail, weights)
         last = max(last, largest(shares_of_orders(older, o, order, fall)))
     growth = largest(newer) - largest(older)
-    return (1.0 if exact else SAFETY) * power_of_two(-last), last, growth
+    return power_of_two(-last - (0.0 if exact else SAFETY / (order - 1))), last, growth
 
 
 @njit(**KERNEL)

@@ -40,6 +40,7 @@ COUNTERS = (
     "turned_to",
     "clear",
     "distant",
+    "crossings",
 )
 NUMBERS = (
     "phase",
