@@ -181,10 +181,10 @@ class _Found:
         variables["status"] = ("start", self.codes, flags())
         variables["message"] = ("start", self.messages)
         used = {**system.parameters, **parameters}
+        taken, alone = np.sum(self.steps, axis=0) if self.steps else (0, 0)
         facts = attributes("ends", system=system, parameters=used)
-        together, alone = np.sum(self.steps, axis=0) if self.steps else (0, 0)
-        facts["steps_together"], facts["steps_alone"] = int(together), int(alone)
-        return xarray.Dataset(variables, coords, facts)
+        steps = {"steps_together": int(taken), "steps_alone": int(alone)}
+        return xarray.Dataset(variables, coords, {**facts, **steps})
 
 
 @attrs.frozen(eq=False)

@@ -29,8 +29,6 @@ NAMED: Mapping[str, str] = {"%": "remainder", "**": "pow"}
 EACH = ("cos", "exp", "log", "log10", "log2", "pow", "sin")
 # So many sums at once stay in registers.
 MOST_SUMS = 12
-# With no more sums than this, each is begun twice: a sum waits for itself.
-FEW_SUMS = 4
 
 
 class AbreastBody(Body):

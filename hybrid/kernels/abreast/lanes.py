@@ -11,7 +11,7 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.events.onset import BY_SPEED
-from hybrid.kernels.steps.series import AHEAD, FINEST, NEXT_TO_NOTHING
+from hybrid.kernels.steps.series import AHEAD, NEXT_TO_NOTHING
 from hybrid.kernels.types.codes import (
     ABREAST,
     DESINGULARISED,
@@ -125,9 +125,3 @@ def leave(lane, places, task, row):
             series[order + 1, n + g] = lane[place + 2 * ABREAST]
         place += 3 * ABREAST
     run.stage = READY
-
-
-@njit(**INLINE)
-def finest_of(model, mode, since, t):
-    """The shortest step of runs, in units of the rounding of their time."""
-    return FINEST * (t if model.timed[mode] == 1 else since)

@@ -248,9 +248,3 @@ def advance_abreast(advance, parts, sea, crew, onward):
             return DONE
         step_together(parts, sea, crew, onward, mode)
     return GO_ON
-
-
-@exported(INTEGER, Parts, Task, Crew, INTEGER, INTEGER)
-def stay_there(parts, task, crew, r, code):
-    """A run that is over at its time (``ONWARD``)."""
-    return code

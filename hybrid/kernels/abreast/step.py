@@ -48,6 +48,7 @@ from hybrid.kernels.abreast.rows import (
     where,
     without,
 )
+from hybrid.kernels.steps.series import FINEST
 from hybrid.kernels.types.codes import (
     ABREAST,
     DESINGULARISED,
@@ -62,8 +63,6 @@ from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
 LONGEST = 1e100
-# Shortest step, in units of the rounding of time.
-FINEST_STEP = 4.0 * EPSILON
 
 
 @njit(**INLINE)
@@ -200,7 +199,7 @@ def step_abreast(model, method, sea, lane, places, mode, tangents, asked):
         h, regular = trusted_length(method, sea, n, tangents, start, stride, order, exact)
         able = both(able, regular)
     remaining, t = rows_at(lane, first + ROOM), magnitude(rows_at(lane, first + T))
-    rounding = FINEST_STEP * (t if model.timed[mode] == 1 else rows_at(lane, first + SINCE))
+    rounding = FINEST * (t if model.timed[mode] == 1 else rows_at(lane, first + SINCE))
     if not on_clock:
         room = smaller(remaining, longest_room(model, lane, places, mode))
         h = smaller(h, smaller(room, method.max_step))

@@ -13,7 +13,6 @@ from numba import njit
 from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.columns import evaluate, evaluate_with_sizes, gather_tangents
-from hybrid.kernels.arithmetic.powers import power_of_two
 from hybrid.kernels.events.bounds import bound_state
 from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced, sides_at
 from hybrid.kernels.events.moments import speed_rounding
@@ -233,8 +232,7 @@ def trusted(task, path, remaining):
         groups = whole_registers(tangents, NARROW) // NARROW
         columns = Columns(n, model.controlled, model.tangent_start, model.tangent_columns[mode], groups)
         h, last, growth = longest_step(series, columns, order, tolerance, work.weights)
-        reach = power_of_two(MOST_BITS / order)
-        if not 1.0 < h * reach < reach * reach:
+        if not order * abs(last) < MOST_BITS:
             order, h, last, growth = within_floats(series, columns, order, tolerance, work.weights)
     fragile = model.fragile[mode] == 1 and clock < 0
     if not h > 0.0 or (fragile and moves_nothing(model, run, series[1], h)):

@@ -3,6 +3,7 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
 from numba import njit
 
 from hybrid.kernels.arithmetic.lanes import (
@@ -18,7 +19,7 @@ from hybrid.kernels.arithmetic.lanes import (
 )
 from hybrid.kernels.arithmetic.powers import binary_logarithms, power_of_two
 from hybrid.kernels.instructions.registers import whole_registers
-from hybrid.kernels.types.codes import NARROW
+from hybrid.kernels.types.codes import HIGHEST_ORDER, NARROW
 from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -50,6 +51,12 @@ MOST_RISE_OF_EXACT = 1.0
 MOST_BITS = 900.0
 # How many bits a term of an exact series may be larger than the next, about as many as there where it ends.
 FALL_OF_EXACT = 4.0
+
+
+# One over each of four orders, from the one in the row down.
+SHARES = np.array(
+    [[1.0 / max(order - place, 1) for place in range(NARROW)] for order in range(HIGHEST_ORDER + 1)]
+)
 
 
 class Columns(NamedTuple):
@@ -148,7 +155,7 @@ def logarithms_of_terms(series, columns, order, least, weights):
 @njit(**INLINE)
 def shares_of_orders(logarithms, first, order, fall):
     """What each of four terms, from order ``first`` down, says of the logarithm of one over the step."""
-    return (logarithms - fall * (order - first + places())) / larger(first - places(), four_times(1.0))
+    return (logarithms - fall * (order - first + places())) * load(SHARES, first, 0)
 
 
 @njit(**INLINE)
