@@ -166,7 +166,8 @@ class Exponents:
         self, points: Sequence[Mapping[str, float]], places: Sequence[Place | None]
     ) -> list[dict[str, Any] | Exception]:
         """The results of several rows, each of which is what it is alone; or the error of a row."""
-        if self.rows.system.growth is not None:
+        # Rows that go on from one another come one at a time: few would take their steps together.
+        if self.rows.system.growth is not None or self.along is not None:
             return [
                 result_of(partial(self.rows.grown, partial(self._row, point=point, place=place)))
                 for point, place in zip(points, places, strict=True)

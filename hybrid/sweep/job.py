@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import islice
 from time import perf_counter
 from typing import Any
 
 import attrs
 import numpy as np
 
-from hybrid.sweep.outcome import Batch, Part, attempt
+from hybrid.simulation.crew import TOGETHER
+from hybrid.sweep.outcome import Batch, Part, attempt, attempts
 from hybrid.sweep.points import Points
 
 # Seconds between two parts in memory, and on disk at least; a long sweep writes larger parts, up to a limit.
@@ -89,6 +91,17 @@ def computed(
 ) -> Iterator[Part]:
     """Compute lines of points one after the other, in a worker; ``wanted`` are the rows that are missing."""
     batch = Batch()
+    if wanted is None and hasattr(task, "together"):
+        every = iter([pair for rows, values in lines for pair in zip(rows, values, strict=True)])
+        while some := list(islice(every, TOGETHER)):
+            points = [dict(zip(names, value, strict=True)) for _, value in some]
+            found = attempts(task, points, [None] * len(points))
+            if is_stopped():
+                break
+            for (row, _), each in zip(some, found, strict=True):
+                batch.add(row, each)
+        yield from batch.taken()
+        return
     for rows, values in lines:
         state = None
         for row, value in zip(rows, values, strict=True):
