@@ -418,7 +418,8 @@ def reaches_one_guard(model, run):
         return False
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         other = model.outgoing[slot]
-        if other != fired and model.surface[other] == model.surface[fired]:
+        # A guard that was zero at the start of the step may not have left zero by more than rounding.
+        if other != fired and (model.surface[other] == model.surface[fired] or run.rehearsal[1, other] > 0):
             return False
     run.side[fired] = -run.side[fired]
     run.on_guard[fired], run.due[fired], run.rehearsal[3, fired] = BY_SPEED, 1, 0

@@ -34,8 +34,9 @@ LAST_TERMS = 5
 # or by no more than so many bands: then an error of their size could turn it back.
 SLOW_SHARE = 1e-6
 SLOW_BANDS = 64.0
-# Two crossings closer than this share of the step are taken for one.
+# Two crossings closer than this share of the step, or than what so many bands hide, are taken for one.
 APART = 1e-9
+ZERO_BANDS = 4.0
 # Steps of Newton's method, and the change, as a share of the place, below which it is rounding.
 MOST_CORRECTIONS = 16
 AT_ROOT = 4.0 * EPSILON
@@ -173,7 +174,7 @@ def first_crossing(model, method, sea, lane, places, mode, order, h, exact, able
     ``sea.fired`` gets the transitions.
     """
     n, powers, first = model.dimension, sea.powers, model.first_outgoing[mode]
-    earliest, distant = in_every_run(2.0), able
+    earliest, widest, distant = in_every_run(2.0), in_every_run(0.0), able
     clock = larger(magnitude(rows_at(lane, places.numbers + T)), rows_at(lane, places.numbers + PERIOD))
     for slot in range(first, model.first_outgoing[mode + 1]):
         if is_twin(model, mode, slot):
@@ -195,15 +196,16 @@ def first_crossing(model, method, sea, lane, places, mode, order, h, exact, able
         if bits_of(one) != 0:
             place, slope, one = root_in(sea, column, order, known, side, begin, length, h, one)
             steep = slope * side < -1.0 * larger(SLOW_SHARE * size, SLOW_BANDS * band)
-            # The slope is that of the guard divided by its variable.
-            one = both(one, both(steep, magnitude(place - earliest) > APART))
+            # Where one guard is zero, the other one is clear of zero.
+            width = larger(ZERO_BANDS * band / magnitude(slope), APART)
+            one = both(one, both(steep, magnitude(place - earliest) > larger(width, widest)))
             upwards, downwards = fires(model, mode, slot, 1), fires(model, mode, slot, -1)
             if upwards == NO_TRANSITION:
                 one = both(one, side > 0.0)
             if downwards == NO_TRANSITION:
                 one = both(one, side < 0.0)
             sooner = both(one, place < earliest)
-            earliest = where(sooner, place, earliest)
+            earliest, widest = where(sooner, place, earliest), where(sooner, width, widest)
             bits, falling = bits_of(sooner), bits_of(side > 0.0)
             for row in range(sea.fired.shape[0]):
                 if (bits >> row) & 1:

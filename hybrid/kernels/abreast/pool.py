@@ -69,7 +69,7 @@ def take_ashore(sea, task, row):
     forget_touches(run)
     for slot in range(first, last):
         transition, column = model.outgoing[slot], n + slot - first
-        run.on_guard[transition] = 0
+        run.rehearsal[1, transition], run.on_guard[transition] = run.on_guard[transition], 0
         run.rehearsal[3, transition] = run.side[transition] if transition == fired else 0
         run.passed[transition] = NO_ROOT
         if holds_roots(model, mode):

@@ -326,6 +326,7 @@ def crossing_on_series(attempts, model, method, run, transition, column, path, w
         guard = guard_at_start(model, run, transition, column)
         leading, rests = leading_of(model, method, run, guard, path, work)
         if rests:
+            run.crossings += UNCERTAIN
             return NO_ROOT, 1.0, True
         if guard.on_guard < LATER:
             # The second cheap proof: the leading powers keep to their side, whatever the others do.

@@ -70,7 +70,7 @@ def test_energy_drifts_by_the_tolerance_and_at_the_tightest_hardly():
 
 def test_series_keep_the_energy_to_rounding():
     """Ten thousand periods with 3759 contacts, with a drift of 1e-15 per period."""
-    (drift,), _ = energy_drift(Taylor(rtol=1e-13, atol=1e-15), np.array([10_000]))
+    (drift,), _ = energy_drift(Taylor(rtol=1e-14, atol=1e-16), np.array([10_000]))
     assert drift < 1e-11
 
 

@@ -124,6 +124,8 @@ def close_roots(draw):
 @example([(1.0, [0.5, 1.0]), (-1.0, [1.0, 1.1]), (-1.0, [1.0, 1.1])])
 # The slope is so flat that the rounding of the terms is more than that of the state and the time.
 @example([(1.0, []), (-0.3, [0.375, 0.40044302797253795, 0.5]), (-0.3, [0.375, 0.40044302797253795, 0.5])])
+# A guard that has just fired is within its rounding still when the next one fires.
+@example([(1.0, [0.4999999999, 0.6249999999999684]), (-1.0, [0.62499999999999]), (-1.0, [])])
 @given(close_roots())
 def test_every_change_of_sign_fires_once(directions, kind, modes, solver, factors):
     got, expected = counted(directions, kind, modes, solver, factors)
