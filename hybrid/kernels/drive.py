@@ -380,7 +380,9 @@ def prepare(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
                 return code, NO_ROOM
             continue
         remaining = time_left(model, run, stop_cycle, stop_phase)
-        clock, tick, band = next_tick(model, run)
+        clock, tick, band = NO_TRANSITION, math.inf, 0.0
+        if model.clocks.shape[0] > 0:
+            clock, tick, band = next_tick(model, run)
         if tick <= band:
             run.pending = fires_at_tick(parts, task, stop_cycle, stop_phase)
             continue
@@ -398,7 +400,9 @@ def prepare(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
             return MAX_STEPS, NO_ROOM
         # A tick that is as good as at the end is there.
         until = remaining if tick + band >= remaining else tick
-        room, knot = room_before_knot(model, run, until)
+        room, knot = until, math.inf
+        if model.knots.shape[0] > 0:
+            room, knot = room_before_knot(model, run, until)
         if not room > 0.0:
             pass_knot(task, knot)
             continue
