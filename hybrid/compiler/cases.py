@@ -15,9 +15,10 @@ from hybrid.compiler.statements.rolled import rolled
 Case = tuple[tuple[int, ...], str]
 
 
-def body_text(statements: Sequence[Statement]) -> str:
-    """Statements, with loops for those that repeat, as text; empty if there are none."""
-    return json.dumps(rolled(statements), separators=(",", ":")) if statements else ""
+def body_text(statements: Sequence[Statement], *, roll: bool = True) -> str:
+    """Statements as text, with loops for those that repeat if these may ``roll``; empty if there are none."""
+    written = rolled(statements) if roll else statements
+    return json.dumps(written, separators=(",", ":")) if statements else ""
 
 
 def cases_of_index(bodies: Iterable[str]) -> list[Case]:

@@ -151,9 +151,12 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
         "reset_jacobian": [text("slopes", each, partial(zeros_first, each.derivative, n)) for each in resets],
         "series": placed(places, [text("series", each, each.statements) for each in series]),
         "tangent_series": placed(places, [text("tangent", each, each.tangent_statements) for each in series]),
-        "series_abreast": placed(beside, [text("series", each, each.statements) for each in abreast]),
+        # Registers of several runs are no entries of arrays, which loops over statements need.
+        "series_abreast": placed(
+            beside, [text("series", each, each.statements, roll=False) for each in abreast]
+        ),
         "tangent_series_abreast": placed(
-            beside, [text("tangent", each, each.tangent_statements) for each in abreast]
+            beside, [text("tangent", each, each.tangent_statements, roll=False) for each in abreast]
         ),
     }
     surface, orientation = writer.surfaces(traced)
@@ -263,13 +266,18 @@ class _Writer:
         return found
 
     def text(
-        self, name: str, source: Any, statements: Sequence[Statement] | Callable[[], Sequence[Statement]]
+        self,
+        name: str,
+        source: Any,
+        statements: Sequence[Statement] | Callable[[], Sequence[Statement]],
+        *,
+        roll: bool = True,
     ) -> str:
         """Statements as text, or those that are made; written once for the object that they come from."""
         # The object is kept with the text: the key is its identity.
         found, _ = self.remembered(
             ("text", name, id(source)),
-            lambda: (body_text(statements() if callable(statements) else statements), source),
+            lambda: (body_text(statements() if callable(statements) else statements, roll=roll), source),
         )
         return found
 

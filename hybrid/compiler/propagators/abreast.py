@@ -30,7 +30,7 @@ from hybrid.compiler.taylor.convolutions import below_highest
 from hybrid.compiler.taylor.loops import GROUPS, VECTORS, StateLoop
 from hybrid.compiler.taylor.series import ONE_THEN_ZERO, ORDER, OUT, NoSeries, Recurrences, o
 from hybrid.expression.derivatives import derivative, directional, divergence
-from hybrid.expression.graph import all_replaced, is_negative, is_whole, replaced
+from hybrid.expression.graph import all_replaced, degree_of, is_negative, is_whole, replaced
 from hybrid.expression.nodes import Expression, Symbol, add, multiply
 from hybrid.expression.operations import Absolute
 from hybrid.expression.tabulated import tables_of_time
@@ -62,10 +62,23 @@ def write_abreast(
     if found.degree > 0 and not all(found.guards):
         # Of such a guard the polynomials of the state tell no end.
         return None
+    if not all(_follows(guard, symbols) for guard in guards):
+        return None
     try:
         return _written(equations_of(field, boundaries, symbols), guards, found.kind)
     except (NoSeries, RecursionError):
         return None
+
+
+def _follows(guard: Expression, symbols: Symbols) -> bool:
+    """Whether the series of a guard is known to converge wherever those of the state do.
+
+    It is a polynomial of the state and of harmonics of time. Any other function may have a pole, or a pulse,
+    that the last terms of its own series say nothing of.
+    """
+    driving = harmonics_of([guard], symbols)
+    variables = frozenset((symbols.t, *symbols.x, *driving.values()))
+    return degree_of(replaced(guard, driving), variables) is not None
 
 
 def _written(mode: Equations, guards: Sequence[Expression], kind: int) -> Series:

@@ -100,6 +100,70 @@ def test_drawn_oscillators_between_walls(stiffness, cubic, amplitude, wall, othe
     assert_same_runs(system, starts, (0.0, 12.0), mode="slow")
 
 
+GUARDS = {
+    "a steep step": lambda t, x, p: np.tanh(30.0 * (x.q - 0.3)) - 0.9,
+    "a pulse in the state": lambda t, x, p: np.exp(-200.0 * (x.q - 0.3) ** 2) - 0.5,
+    "a pulse in time": lambda t, x, p: np.exp(-50.0 * (t - 2.3) ** 2) - 0.4 + 0.001 * x.q,
+    "a pole beside the path": lambda t, x, p: 1.0 / (1.0 + 1e4 * (x.q - 0.3) ** 2) - 0.5,
+    "a sine of the state": lambda t, x, p: np.sin(3.0 * x.q) - 0.5,
+    "a moving threshold": lambda t, x, p: x.q - 0.5 * np.tanh(4.0 * (t - 3.0)),
+    "a power": lambda t, x, p: x.q**9 - 0.01,
+    "a product with a sine of time": lambda t, x, p: x.q * x.v - 0.2 * np.sin(11.0 * t),
+}
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("guard", GUARDS.values(), ids=GUARDS.keys())
+def test_guards_of_any_function(guard, direction):
+    """A pendulum that counts the crossings, on a surface that two transitions share."""
+    system = HybridSystem(
+        state=("q", "v", "n"),
+        modes=[Mode("m", lambda t, x, p: (x.v, -2.0 * np.sin(x.q), 0.0))],
+        transitions=[
+            Transition(
+                "m", "m", Guard(guard, direction), Reset(lambda t, x, p: (x.q, x.v, x.n + 1.0)), name="first"
+            ),
+            Transition("m", "m", Guard(guard, -direction), name="back"),
+        ],
+    )
+    random = np.random.default_rng(4)
+    starts = np.column_stack([random.uniform(-1.0, 1.0, (16, 2)), np.zeros(16)])
+    assert_same_runs(system, starts, (0.0, 6.0))
+
+
+def test_transitions_that_share_a_crossing_are_told():
+    """Two on one surface fire the same way: which comes first matters, in many runs as in one."""
+    surface = Guard(lambda t, x, p: x.q - 0.3, 1)
+    system = HybridSystem(
+        state=("q", "v"),
+        modes=[Mode("m", lambda t, x, p: (x.v, -x.q))],
+        transitions=[
+            Transition("m", "m", surface, Reset(lambda t, x, p: (x.q, 0.5 * x.v)), name="half"),
+            Transition("m", "m", surface, Reset(lambda t, x, p: (x.q, 2.0 * x.v)), name="double"),
+        ],
+    )
+    assert_same_runs(system, np.random.default_rng(4).uniform(-1.0, 0.2, (12, 2)), (0.0, 5.0))
+
+
+def test_like_terms_of_a_larger_system_are_taken_together():
+    """What is written as a loop for a single run is written out here."""
+
+    def field(t, x, p):
+        q, v = x[:6], x[6:]
+        return (*v, *(-np.sin(each) + 0.1 * np.cos((i + 1.0) * t) for i, each in enumerate(q)))
+
+    wall = Transition(
+        "m",
+        "m",
+        Guard(lambda t, x, p: x[0] - 0.4, 1),
+        Reset(lambda t, x, p: (*x[:6], -0.8 * x[6], *x[7:])),
+    )
+    system = HybridSystem(state=12, modes=[Mode("m", field)], transitions=[wall])
+    compiled = hybrid.compile_system(system)
+    assert together(compiled, plan_of(compiled, hybrid.Taylor(), 0), 0).able.all()
+    assert_same_runs(system, np.random.default_rng(6).uniform(-0.3, 0.3, (10, 12)), (0.0, 8.0))
+
+
 def test_a_run_does_not_depend_on_those_beside_it():
     """To the last bit, alone, among others, and in another order."""
     system, ranges = RUNS["vibroimpact"]
