@@ -111,17 +111,21 @@ def test_threads_that_run_one_system_do_not_share_memory():
 @pytest.mark.parametrize(("options", "most"), [({"samples": [PERIOD]}, 105), ({}, 115)])
 def test_a_short_run_costs_few_calls_of_python(options, most):
     """The kernel takes 8 us for this run, as long as 60 calls of Python functions."""
-    calls = 0
 
-    def count(frame, event, argument):
-        nonlocal calls
-        calls += event == "call"
+    def calls() -> int:
+        count = 0
 
-    run(**options)
-    before = sys.getprofile()
-    sys.setprofile(count)
-    try:
-        run(**options)
-    finally:
-        sys.setprofile(before)
-    assert calls <= most
+        def called(frame, event, argument):
+            nonlocal count
+            count += event == "call"
+
+        before = sys.getprofile()
+        sys.setprofile(called)
+        try:
+            run(**options)
+        finally:
+            sys.setprofile(before)
+        return count
+
+    # A collection of garbage within a run may call finalizers of what other tests left.
+    assert min(calls() for _ in range(4)) <= most
