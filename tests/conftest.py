@@ -11,7 +11,7 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 # Tracing makes many small objects. Fewer searches for garbage among them save processor time.
 gc.set_threshold(20_000, 20, 20)
 
-pytest_plugins = ["tests.nudge"]
+pytest_plugins = ["tests.alone", "tests.nudge"]
 
 
 def pytest_addoption(parser):

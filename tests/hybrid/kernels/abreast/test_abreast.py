@@ -53,6 +53,7 @@ def test_many_runs_of_a_model_are_those_of_each(name):
     assert_same_runs(system, starts, ranges["t_span"])
 
 
+@pytest.mark.abreast
 @pytest.mark.parametrize("tangents", [0, 1])
 @pytest.mark.parametrize("name", ["vibroimpact", "impact_oscillator", "bouncing_ball", "bilinear_oscillator"])
 def test_a_plain_model_takes_its_steps_abreast(name, tangents):
@@ -145,6 +146,7 @@ def test_transitions_that_share_a_crossing_are_told():
     assert_same_runs(system, np.random.default_rng(4).uniform(-1.0, 0.2, (12, 2)), (0.0, 5.0))
 
 
+@pytest.mark.abreast
 def test_like_terms_of_a_larger_system_are_taken_together():
     """What is written as a loop for a single run is written out here."""
 
