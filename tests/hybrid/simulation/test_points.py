@@ -13,6 +13,8 @@ import hybrid
 import models
 from hybrid import DOP853, simulate
 
+# Where functions of the library come from, those included that attrs writes.
+OURS = (hybrid.__path__[0], "<attrs generated")
 SYSTEM = models.vibroimpact()
 PERIOD = SYSTEM.forcing_period()
 START = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
@@ -108,16 +110,18 @@ def test_threads_that_run_one_system_do_not_share_memory():
     assert [held(arc) for arc in arcs] == wanted * 25
 
 
-@pytest.mark.parametrize(("options", "most"), [({"samples": [PERIOD]}, 105), ({}, 115)])
-def test_a_short_run_costs_few_calls_of_python(options, most):
-    """The kernel takes 8 us for this run, as long as 60 calls of Python functions."""
+@pytest.mark.parametrize(("options", "most"), [({"samples": [PERIOD]}, 95), ({}, 100)])
+def test_a_short_run_costs_few_calls_of_python(options, most, request):
+    """The kernel takes 4 us for this run, as long as 30 calls of Python functions."""
+    if request.config.getoption("nudge") or request.config.getoption("nudge_back"):
+        pytest.skip("numbers are moved by calls of Python, too")
 
     def calls() -> int:
         count = 0
 
         def called(frame, event, argument):
             nonlocal count
-            count += event == "call"
+            count += event == "call" and frame.f_code.co_filename.startswith(OURS)
 
         before = sys.getprofile()
         sys.setprofile(called)
