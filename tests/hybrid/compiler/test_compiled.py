@@ -66,6 +66,7 @@ def test_what_tracing_proves():
     assert not emitted.opaque
 
 
+@pytest.mark.abreast
 def test_a_run_compiles_only_what_it_needs():
     system = impact_oscillator()
     parts = compile_system(system).parts
