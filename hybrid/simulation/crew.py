@@ -18,17 +18,15 @@ from hybrid.compiler.compiled import CompiledSystem
 from hybrid.compiler.parts import ABREAST_SERIES, ABREAST_TANGENT_SERIES
 from hybrid.compiler.statements.code import LoweringError
 from hybrid.kernels.types import codes
-from hybrid.kernels.types.abreast import Abreast
+from hybrid.kernels.types.abreast import DEGREE, NUMBERS, PER_GUARD, Abreast
 from hybrid.kernels.types.abreast import Crew as Memory
 from hybrid.kernels.types.structure import Layout
 from hybrid.simulation.memory import MOST_LAYOUTS
 
-# Numbers of a lane besides state, parameters and sizes, and those of each guard (``kernels.abreast.lanes``).
-NUMBERS, PER_GUARD = 12, 3
 # Rows of the series behind the last order; columns are read four at a time.
 ROWS_OF_END, SPARE_COLUMNS = 3, 3
-# A guard is looked at up to this degree, and divided by its variable.
-POWERS = 16
+# A guard that is zero at the start is divided by its variable: it has a power more.
+POWERS = DEGREE + 2
 # Steps after which a run leaves its lane, so that Python hears of it; and in which tangent vectors that are
 # kept orthonormal may come too close: as often as ``arithmetic.tangent.keep_apart`` looks, one alone seldom.
 LONGEST_STAY, ALONE = 256, 32

@@ -28,10 +28,9 @@ from hybrid.kernels.abreast.rows import (
     where,
     without,
 )
+from hybrid.kernels.types.abreast import DEGREE
 from hybrid.kernels.types.options import INLINE, KERNEL
 
-# Degree up to which a guard is looked at; the terms behind are a part of the band.
-DEGREE = 14
 # Pieces that are looked at, and the shortest one, as a share of the step.
 MOST_PIECES = 16
 SHORTEST_PIECE = 0.01

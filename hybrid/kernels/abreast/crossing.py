@@ -2,8 +2,7 @@
 
 from numba import njit
 
-from hybrid.kernels.abreast.certificate import DEGREE, certify
-from hybrid.kernels.abreast.lanes import PERIOD, T
+from hybrid.kernels.abreast.certificate import certify
 from hybrid.kernels.abreast.rows import (
     binary_logarithms_of,
     bits_of,
@@ -22,7 +21,9 @@ from hybrid.kernels.abreast.rows import (
     without,
 )
 from hybrid.kernels.events.guards import ROUNDING_OF_STATE
-from hybrid.kernels.types.codes import DESINGULARISED, NO_TRANSITION, ROOTED
+from hybrid.kernels.steps.series import holds_roots
+from hybrid.kernels.types.abreast import DEGREE, PER_GUARD, PERIOD, T
+from hybrid.kernels.types.codes import NO_TRANSITION
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -67,7 +68,7 @@ def band_of(model, method, sea, clock, mode, slot, order, size, h, exact):
         if not exact and i < model.controlled:
             error = fused(scale, method.rtol, error + method.atol)
         band = fused(entry_at(powers, row, i), error, band)
-    if model.propagator[mode] == DESINGULARISED or model.propagator[mode] == ROOTED:
+    if holds_roots(model, mode):
         # The column may hold the root of the guard.
         band = (
             square_root(band)
@@ -181,8 +182,8 @@ def first_crossing(model, method, sea, lane, places, mode, order, h, exact, able
             continue
         column = n + slot - first
         value, size = end_with_size(powers, column, order, h)
-        start, side = entry_at(powers, 0, column), rows_at(lane, places.guards + 3 * (slot - first))
-        known = rows_at(lane, places.guards + 3 * (slot - first) + 1) > 0.5
+        start, side = entry_at(powers, 0, column), rows_at(lane, places.guards + PER_GUARD * (slot - first))
+        known = rows_at(lane, places.guards + PER_GUARD * (slot - first) + 1) > 0.5
         band = band_of(model, method, sea, clock, mode, slot - first, order, size, h, exact)
         distant = both(distant, value * side > DISTANT * band)
         keeps = without(start * side > size - value * side + 2.0 * band, known)

@@ -1,8 +1,7 @@
 """Where the runs that are abreast are: a run comes aboard, takes steps, and leaves when something happens.
 
-The entries of a lane are those of the state and the tangent vectors, the parameters, the numbers named here,
-the sizes of the state's components over the last step, and of each guard the side, whether it is zero at the
-start of the step, and the root that the last step ended with.
+The entries of a lane are those of the state and the tangent vectors, the parameters, the numbers that
+``types.abreast`` names, the sizes of the state's components over the last step, and those of each guard.
 """
 
 from typing import NamedTuple
@@ -11,23 +10,32 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.events.onset import BY_SPEED
-from hybrid.kernels.steps.series import AHEAD, NEXT_TO_NOTHING
-from hybrid.kernels.types.codes import (
-    ABREAST,
-    DESINGULARISED,
-    EXACT,
-    HIGHEST_ORDER,
-    READY,
-    ROOTED,
+from hybrid.kernels.steps.series import (
+    AHEAD,
+    NEXT_TO_NOTHING,
+    holds_roots,
+    number_of_guards,
+    order_of,
 )
+from hybrid.kernels.types.abreast import (
+    AHEAD_OF_STAY,
+    CYCLE,
+    DIVERGENCE,
+    FOLLOWS,
+    LONGEST_STEP,
+    LOW,
+    NUMBERS,
+    PER_GUARD,
+    PERIOD,
+    ROOM,
+    SINCE,
+    STAY,
+    STEPS,
+    T,
+)
+from hybrid.kernels.types.codes import ABREAST, READY
 from hybrid.kernels.types.kinds import INTEGER
 from hybrid.kernels.types.options import INLINE, KERNEL
-
-# Time, what it has lost in rounding, and whole periods; the time since the entry, the longest step; the time
-# until the next step must end; the time that the last stay took, and its share by which a step may exceed
-# that; the steps taken, the integral of div f, whether the roots are those of a step, the period.
-T, LOW, CYCLE, SINCE, LONGEST_STEP, ROOM, STAY, AHEAD_OF_STAY, STEPS, DIVERGENCE, FOLLOWS, PERIOD = range(12)
-NUMBERS = 12
 
 
 class Places(NamedTuple):
@@ -47,23 +55,7 @@ def places_in(model, tangents, parameters, mode):
     first = n * (1 + tangents)
     numbers = first + parameters
     sizes = numbers + NUMBERS
-    return Places(
-        first, numbers, sizes, sizes + n, model.first_outgoing[mode + 1] - model.first_outgoing[mode]
-    )
-
-
-@njit(**INLINE)
-def order_of(model, method, mode):
-    """The order of the series of a mode."""
-    if model.degree[mode] > 0:
-        return model.degree[mode]
-    return HIGHEST_ORDER if model.propagator[mode] == EXACT else method.order
-
-
-@njit(**INLINE)
-def holds_roots(model, mode):
-    """Whether the series of a mode hold roots of its guards."""
-    return model.propagator[mode] == DESINGULARISED or model.propagator[mode] == ROOTED
+    return Places(first, numbers, sizes, sizes + n, number_of_guards(model, mode))
 
 
 @njit(**KERNEL)
@@ -95,7 +87,7 @@ def come_aboard(lane, places, task, room, row):
         lane[place] = run.side[transition]
         lane[place + ABREAST] = 1.0 if run.on_guard[transition] == BY_SPEED else 0.0
         lane[place + 2 * ABREAST] = series[order + 1, n + g] if rooted else 0.0
-        place += 3 * ABREAST
+        place += PER_GUARD * ABREAST
 
 
 @njit(**KERNEL)
@@ -123,5 +115,5 @@ def leave(lane, places, task, row):
         run.on_guard[model.outgoing[slot + g]] = 0
         if rooted:
             series[order + 1, n + g] = lane[place + 2 * ABREAST]
-        place += 3 * ABREAST
+        place += PER_GUARD * ABREAST
     run.stage = READY

@@ -190,46 +190,32 @@ def mask_of(typing_context, bits):
     return MASK(types.int64), generate
 
 
-def _operation(instruction):
+def _of_two(result, write):
+    """The function of two operands, each one number of each run or one for all, that ``write`` writes."""
+
     @intrinsic
     def operate(typing_context, a, b):
         kinds = [each if each == ROWS else types.float64 for each in (a, b)]
 
         def generate(context, builder, signature, arguments):
-            return getattr(builder, instruction)(*_in_rows(builder, kinds, arguments), flags=FUSED)
+            return write(builder, *_in_rows(builder, kinds, arguments))
 
-        return ROWS(*kinds), generate
+        return result(*kinds), generate
 
     return operate
 
 
+def _operation(instruction):
+    return _of_two(ROWS, lambda builder, a, b: getattr(builder, instruction)(a, b, flags=FUSED))
+
+
 def _comparison(symbol):
-    @intrinsic
-    def compare(typing_context, a, b):
-        kinds = [each if each == ROWS else types.float64 for each in (a, b)]
-
-        def generate(context, builder, signature, arguments):
-            return builder.fcmp_ordered(symbol, *_in_rows(builder, kinds, arguments))
-
-        return MASK(*kinds), generate
-
-    return compare
+    return _of_two(MASK, lambda builder, a, b: builder.fcmp_ordered(symbol, a, b))
 
 
 def _choice(symbol):
     """The larger or the smaller number of each run; ``b`` where one is nan."""
-
-    @intrinsic
-    def choose(typing_context, a, b):
-        kinds = [each if each == ROWS else types.float64 for each in (a, b)]
-
-        def generate(context, builder, signature, arguments):
-            one, other = _in_rows(builder, kinds, arguments)
-            return builder.select(builder.fcmp_ordered(symbol, one, other), one, other)
-
-        return ROWS(*kinds), generate
-
-    return choose
+    return _of_two(ROWS, lambda builder, a, b: builder.select(builder.fcmp_ordered(symbol, a, b), a, b))
 
 
 larger, smaller = _choice(">"), _choice("<")

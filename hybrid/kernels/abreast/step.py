@@ -16,22 +16,6 @@ import math
 from numba import njit
 
 from hybrid.kernels.abreast.crossing import first_crossing
-from hybrid.kernels.abreast.lanes import (
-    AHEAD_OF_STAY,
-    CYCLE,
-    DIVERGENCE,
-    FOLLOWS,
-    LONGEST_STEP,
-    LOW,
-    PERIOD,
-    ROOM,
-    SINCE,
-    STAY,
-    STEPS,
-    T,
-    holds_roots,
-    order_of,
-)
 from hybrid.kernels.abreast.length import trusted_length, weigh
 from hybrid.kernels.abreast.rows import (
     bits_of,
@@ -48,7 +32,23 @@ from hybrid.kernels.abreast.rows import (
     where,
     without,
 )
-from hybrid.kernels.steps.series import FINEST
+from hybrid.kernels.arithmetic.clock import sum_in_two_parts
+from hybrid.kernels.steps.series import FINEST, holds_roots, order_of
+from hybrid.kernels.types.abreast import (
+    AHEAD_OF_STAY,
+    CYCLE,
+    DIVERGENCE,
+    FOLLOWS,
+    LONGEST_STEP,
+    LOW,
+    PER_GUARD,
+    PERIOD,
+    ROOM,
+    SINCE,
+    STAY,
+    STEPS,
+    T,
+)
 from hybrid.kernels.types.codes import (
     ABREAST,
     DESINGULARISED,
@@ -57,7 +57,6 @@ from hybrid.kernels.types.codes import (
     FROM_STATE,
     FROM_ZERO,
     NO_TRANSITION,
-    ROOTED,
 )
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
@@ -113,9 +112,9 @@ def set_origins(sea, lane, places, n, order):
     """Tell the series what they may take the roots of guards from (``steps.series.set_origins``)."""
     follows = rows_at(lane, places.numbers + FOLLOWS) > 0.5
     for g in range(places.count):
-        known = rows_at(lane, places.guards + 3 * g + 1) > 0.5
+        known = rows_at(lane, places.guards + PER_GUARD * g + 1) > 0.5
         origin = where(follows, float(FROM_LAST_STEP), float(FROM_STATE))
-        put_entry(sea.powers, order + 1, n + g, rows_at(lane, places.guards + 3 * g + 2))
+        put_entry(sea.powers, order + 1, n + g, rows_at(lane, places.guards + PER_GUARD * g + 2))
         put_entry(sea.powers, order + 2, n + g, where(known, float(FROM_ZERO), origin))
 
 
@@ -134,7 +133,7 @@ def take_step(model, sea, lane, places, mode, tangents, order, going):
             place = n * (1 + k) + i
             put_rows(lane, place, where(going, entry_at(powers, order + 1, begin + i), rows_at(lane, place)))
     for g in range(places.count):
-        place = places.guards + 3 * g
+        place = places.guards + PER_GUARD * g
         put_rows(lane, place + 1, where(going, 0.0, rows_at(lane, place + 1)))
         if rooted:
             root = entry_at(powers, order + 1, n + g)
@@ -152,23 +151,15 @@ def take_step(model, sea, lane, places, mode, tangents, order, going):
 
 
 @njit(**INLINE)
-def sum_of(a, b):
-    """``a + b``, rounded, and its rounding error (``arithmetic.clock``)."""
-    total = a + b
-    part = total - a
-    return total, (a - (total - part)) + (b - part)
-
-
-@njit(**INLINE)
 def move_clock(lane, first, span):
     """``arithmetic.clock.forward`` of all runs."""
-    phase, lost = sum_of(rows_at(lane, first + T), span)
-    phase, low = sum_of(phase, lost + rows_at(lane, first + LOW))
+    phase, lost = sum_in_two_parts(rows_at(lane, first + T), span)
+    phase, low = sum_in_two_parts(phase, lost + rows_at(lane, first + LOW))
     cycle, period = rows_at(lane, first + CYCLE), rows_at(lane, first + PERIOD)
     over = both(phase >= period, period > 0.0)
     while bits_of(over) != 0:
-        earlier, lost = sum_of(phase, where(over, -period, 0.0))
-        earlier, lost = sum_of(earlier, lost + low)
+        earlier, lost = sum_in_two_parts(phase, where(over, -period, 0.0))
+        earlier, lost = sum_in_two_parts(earlier, lost + low)
         phase, low = where(over, earlier, phase), where(over, lost, low)
         cycle = cycle + where(over, 1.0, 0.0)
         over = both(phase >= period, period > 0.0)
@@ -185,10 +176,11 @@ def step_abreast(model, method, sea, lane, places, mode, tangents, asked):
     the state is a sum of, are left in the rows behind the series.
     """
     n, powers, kind = model.dimension, sea.powers, model.propagator[mode]
-    exact, on_clock, first = kind == EXACT, kind == DESINGULARISED, places.numbers
-    order, degree, guards = order_of(model, method, mode), model.degree[mode], places.count
+    exact, on_clock, rooted = kind == EXACT, kind == DESINGULARISED, holds_roots(model, mode)
+    order, degree = order_of(model, method, mode), model.degree[mode]
+    first, guards = places.numbers, places.count
     start, stride = sea.tangent_start, sea.tangent_columns[mode]
-    if on_clock or kind == ROOTED:
+    if rooted:
         set_origins(sea, lane, places, n, order)
     x = lane[: places.parameters * ABREAST]
     p = lane[places.parameters * ABREAST : first * ABREAST]
@@ -214,9 +206,7 @@ def step_abreast(model, method, sea, lane, places, mode, tangents, asked):
         event = earliest <= 1.0
         h = where(event, earliest * h, h)
     # The state; guards and the clock if there is one; the divergence with tangent vectors.
-    width = n
-    if on_clock or kind == ROOTED:
-        width = n + guards + 1
+    width = n + guards + 1 if rooted else n
     if tangents > 0:
         width = n + guards + 2
     for column in range(0, width, 4):

@@ -244,6 +244,17 @@ def error_band(method, run, gradient, n):
     return size
 
 
+@njit(**INLINE)
+def acceleration_along(model, mode, work):
+    """Acceleration of a plane with normal ``work.gradient``; field and Jacobian in ``work`` are current."""
+    total = 0.0
+    for i in range(model.dimension):
+        if work.gradient[i] != 0.0:
+            bend = change_of_rate(model, mode, i, work.jacobian, work.field)
+            total += work.gradient[i] * (work.jacobian[i, model.dimension] + bend)
+    return total
+
+
 @njit(**KERNEL)
 def guard_acceleration(model, run, transition, mode, t, x, work):
     """Second Lie derivative of a guard along the flow; ``work.field`` and ``work.gradient`` are current.
@@ -253,11 +264,7 @@ def guard_acceleration(model, run, transition, mode, t, x, work):
     """
     n = model.dimension
     slopes_at_guard(model, run, transition, mode, t, x, work)
-    total = 0.0
-    for i in range(n):
-        if work.gradient[i] != 0.0:
-            bend = work.jacobian[i, n] + change_of_rate(model, mode, i, work.jacobian, work.field)
-            total += work.gradient[i] * bend
+    total = acceleration_along(model, mode, work)
     if model.affine_guard[transition] == 1:
         return total
     for i in range(n):

@@ -29,7 +29,7 @@ from hybrid.kernels.jumps.locked import (
     postpone_map,
     restore_tangents,
 )
-from hybrid.kernels.jumps.past import remember_impulse, remember_visit, slot_of
+from hybrid.kernels.jumps.past import impulse_of, remember_visit, slot_of
 from hybrid.kernels.jumps.record import remember_jump
 from hybrid.kernels.jumps.rest import rest_matrix
 from hybrid.kernels.jumps.steep import is_steep, is_steep_behind, keep_unknown_time
@@ -221,7 +221,7 @@ def leave(model, run, transition, transversality, work):
     """Move the run past a jump to ``work.new``."""
     mode, target = run.mode, model.target[transition]
     if mode == target and model.marker[transition] == 0 and model.clock[transition] == 0:
-        remember_impulse(model, run, transition, transversality, work)
+        run.restitution = impulse_of(model, run, transition, transversality, work, run.trail[IMPULSE])
     if target not in (NO_MODE, mode):
         carry_rounding(model, run, transition, run.phase, run.y, work.new, work.reset_jacobian, work.state)
     move(model, run, transition, mode if target == NO_MODE else target, work.new)

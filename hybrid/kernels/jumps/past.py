@@ -3,7 +3,6 @@
 from numba import njit
 
 from hybrid.kernels.events.guards import ROUNDING_OF_STATE, guard_speed
-from hybrid.kernels.types.codes import IMPULSE
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -43,14 +42,13 @@ def time_before(model, run, back, further):
     return later[n] - earlier[n] + model.period * (later[n + 1] - earlier[n + 1])
 
 
-@njit(**KERNEL)
-def remember_impulse(model, run, transition, transversality, work):
-    """Keep the restitution of the jump to ``work.new``, and its direction per unit of the guard's speed."""
-    n = model.dimension
+@njit(**INLINE)
+def impulse_of(model, run, transition, transversality, work, direction):
+    """The restitution of the jump to ``work.new``; ``direction (n,)`` gets that per unit of guard's speed."""
     after = guard_speed(model, transition, run.phase, work.new, work.field_after, work.gradient)
-    run.restitution = -after / transversality
-    for i in range(n):
+    for i in range(model.dimension):
         change = work.new[i] - run.y[i]
         # A reset that puts the state back on the guard only removes the rounding error of the landing.
         rounding = abs(change) <= ROUNDING_OF_STATE * EPSILON * run.scale[i]
-        run.trail[IMPULSE, i] = 0.0 if rounding else change / (after - transversality)
+        direction[i] = 0.0 if rounding else change / (after - transversality)
+    return -after / transversality

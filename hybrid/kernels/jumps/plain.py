@@ -9,11 +9,10 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.slopes import change_of_rate
 from hybrid.kernels.arithmetic.tangent import STRAINED, multiply, strain
 from hybrid.kernels.events.guards import (
     LEFT_BEHIND,
-    ROUNDING_OF_STATE,
+    acceleration_along,
     guard_speed,
     guard_value,
     rounding_band,
@@ -23,6 +22,7 @@ from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.events.surface import finds_surface
 from hybrid.kernels.jumps.jump import ends_own_flight, is_grazing, judge, move
 from hybrid.kernels.jumps.locked import postpone_map
+from hybrid.kernels.jumps.past import impulse_of
 from hybrid.kernels.jumps.record import remember_jump
 from hybrid.kernels.types.codes import (
     IMPULSE,
@@ -31,7 +31,7 @@ from hybrid.kernels.types.codes import (
     TRANSVERSE,
 )
 from hybrid.kernels.types.kinds import INTEGER, TRUTH
-from hybrid.kernels.types.layout import EPSILON, Task
+from hybrid.kernels.types.layout import Task
 from hybrid.kernels.types.options import INLINE, exported
 from hybrid.kernels.types.task import task_of
 
@@ -107,13 +107,7 @@ def log_determinant_of(matrix, scratch, n):
 @njit(**INLINE)
 def acceleration(model, other, mode, t, work):
     """The acceleration of a guard at ``work.new``: field, gradient and Jacobian in ``work`` are current."""
-    total = 0.0
-    for i in range(model.dimension):
-        if work.gradient[i] != 0.0:
-            bend = work.jacobian[i, model.dimension] + change_of_rate(
-                model, mode, i, work.jacobian, work.field
-            )
-            total += work.gradient[i] * bend
+    total = acceleration_along(model, mode, work)
     if model.affine_guard[other] == 1:
         return total
     for i in range(model.dimension):
@@ -201,7 +195,9 @@ def jump_plainly(task, fired):
     judged = asked and not ends_own_flight(model, run, fired, transversality)
     if judged and is_grazing(model, method, run, fired, transversality, work):
         return False
-    restitution = impulse_of(model, run, fired, mode == target, transversality, work)
+    restitution = 0.0
+    if mode == target:
+        restitution = impulse_of(model, run, fired, transversality, work, work.settled)
     for i in range(n):
         work.error[i] = run.scale[i]
     if mode != target:
@@ -230,20 +226,3 @@ def jump_plainly(task, fired):
     move(model, run, fired, target, work.new)
     run.clear = 1
     return True
-
-
-@njit(**INLINE)
-def impulse_of(model, run, fired, same, transversality, work):
-    """The restitution of a jump, and its direction per unit of the guard's speed into ``work.settled``.
-
-    As ``past.remember_impulse``.
-    """
-    n = model.dimension
-    if not same:
-        return 0.0
-    after = guard_speed(model, fired, run.phase, work.new, work.field_after, work.gradient)
-    for i in range(n):
-        change = work.new[i] - run.y[i]
-        rounding = abs(change) <= ROUNDING_OF_STATE * EPSILON * run.scale[i]
-        work.settled[i] = 0.0 if rounding else change / (after - transversality)
-    return -after / transversality

@@ -79,6 +79,20 @@ def number_of_guards(model, mode):
     return model.first_outgoing[mode + 1] - model.first_outgoing[mode]
 
 
+@njit(**INLINE)
+def order_of(model, method, mode):
+    """The order of the series of a mode."""
+    if model.degree[mode] > 0:
+        return model.degree[mode]
+    return HIGHEST_ORDER if model.propagator[mode] == EXACT else method.order
+
+
+@njit(**INLINE)
+def holds_roots(model, mode):
+    """Whether the series of a mode hold roots of its guards."""
+    return model.propagator[mode] == DESINGULARISED or model.propagator[mode] == ROOTED
+
+
 @njit(**KERNEL)
 def step_until(path, remaining, work):
     """Shorten a step on the clock of a desingularised mode so that it does not pass the end of the run.
@@ -209,11 +223,9 @@ def project_on_guard(model, run, transition, t, work):
 def expanded(model, method, run, tangents, work):
     """The path of the series from the state on, without an end."""
     mode, n, kind = run.mode, model.dimension, model.propagator[run.mode]
-    order = HIGHEST_ORDER if kind == EXACT else method.order
-    if model.degree[mode] > 0:
-        order = model.degree[mode]
+    order = order_of(model, method, mode)
     clock = n + number_of_guards(model, mode) if kind == DESINGULARISED else -1
-    if kind in (DESINGULARISED, ROOTED):
+    if holds_roots(model, mode):
         set_origins(model, run, order, work.series)
     # A run may be taken on without its tangent vectors: the columns are those of what is passed.
     model.series(mode, run.phase, run.y[: n * (1 + tangents)], model.parameters, order, work.series)

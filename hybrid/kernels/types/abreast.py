@@ -4,6 +4,17 @@ from hybrid.kernels.types.kinds import INDEX_MATRIX, INDICES, INTEGER, MATRIX, V
 from hybrid.kernels.types.layout import Parts, Task
 from hybrid.kernels.types.structure import Structure
 
+# Numbers of a lane besides state, parameters, sizes: time, what it has lost in rounding, whole periods; the
+# time since the entry, the longest step; the time until the next step must end; the time that the last stay
+# took, and its share by which a step may exceed that; the steps taken, the integral of div f, whether the
+# roots are those of a step, the period.
+T, LOW, CYCLE, SINCE, LONGEST_STEP, ROOM, STAY, AHEAD_OF_STAY, STEPS, DIVERGENCE, FOLLOWS, PERIOD = range(12)
+NUMBERS = 12
+# Those of each guard: its side, whether it is zero at the start of the step, the root that the last one left.
+PER_GUARD = 3
+# Degree up to which a guard is looked at; the terms behind are a part of the band.
+DEGREE = 14
+
 SERIES_ABREAST = function(None, INTEGER, VECTOR, VECTOR, VECTOR, INTEGER, MATRIX)
 
 
