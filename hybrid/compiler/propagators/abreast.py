@@ -15,11 +15,9 @@ from hybrid.compiler.propagators.desingularised import write_desingularised
 from hybrid.compiler.propagators.equations import Boundary, Equations, equations_of
 from hybrid.compiler.propagators.rooted import regular_roots, write_rooted
 from hybrid.compiler.propagators.writing import (
-    OTHERS,
     Body,
     each_order,
     harmonics_of,
-    named,
     names_of_state,
     seeds_of,
     write_series,
@@ -119,96 +117,6 @@ def _with_forcing(
         directional(moved, seeds),
         seeds,
     )
-
-
-class AbreastBody(Body):
-    """The body of a mode for runs abreast; ``watched`` are the guards as functions of time and state."""
-
-    def __init__(self, watched: Sequence[Expression], symbols: Symbols, *others: Any) -> None:
-        self.watched = watched
-        super().__init__(symbols, *others)
-
-    def first_columns(self) -> int:
-        """How many columns come first."""
-        return self.behind_guards + OTHERS
-
-    def assemble(
-        self,
-        names: Sequence[Symbol | None],
-        columns: list[int],
-        starts: list[Any],
-        rates: Sequence[Expression],
-        guards: Sequence[Expression],
-        trace: Expression,
-        tangents: Sequence[Expression],
-        seeds: dict[Symbol, Symbol],
-    ) -> Series:
-        """As ``Body.assemble``."""
-        free = self.columns
-        alone = self._loop("s", names, columns, starts, rates, guards)
-        places = self._columns_of_pairs(alone)
-        width, self.columns = self.columns, free
-        columns, starts = [*columns, self.column(1)], [*starts, 0.0]
-        moved = self._loop("a", [*names, None], columns, starts, [*rates, trace], guards)
-        vectors = AbreastRecurrences(
-            dict.fromkeys(seeds.values(), 0), None, self.allot, "b", self.constants, moved.block, lanes=True
-        )
-        vectors.expect(seeds.values(), tangents)
-        carried = AbreastTangents(list(seeds.values()), vectors)
-        carried.compute(tangents)
-        placed = self._columns_of_pairs(moved) | carried.places()
-        shared = [*self.preamble, *self.constants.statements(), *self._sizes_of_guards(), put(o, 0)]
-        counted = put(GROUPS, call("length", "x") // self.n - 1)
-        return Series(
-            (*named(places), *shared, *alone.first(), each_order(alone.higher())),
-            (
-                *named(placed),
-                counted,
-                *shared,
-                *moved.first(),
-                *carried.first(),
-                each_order([*moved.higher(), *carried.higher()]),
-            ),
-            max(width, self.columns),
-            0,
-            carried.columns,
-        )
-
-    def _loop(
-        self,
-        prefix: str,
-        names: Sequence[Symbol | None],
-        columns: list[int],
-        starts: list[Any],
-        rates: Sequence[Expression],
-        guards: Sequence[Expression],
-    ) -> AbreastLoop:
-        block = self._block(prefix)
-        block.expect(names, rates)
-        moved = AbreastLoop(names, columns, rates, starts, block)
-        moved.others = {self.n + place: block.coefficient(guard) for place, guard in enumerate(guards)}
-        return moved
-
-    def _columns_of_pairs(self, moved: AbreastLoop) -> dict[str, int]:
-        """The column of the second factor of each convolution, by name; it has a new one if it has none."""
-        block, places = moved.block, dict[str, int]()
-        for place, (_, right) in enumerate(block.pairs):
-            known = block.rows.get(right)
-            if not isinstance(known, int):
-                known = self.allot()
-                moved.factors[place] = known
-            places[f"{block.prefix}c{place}"] = known
-        return places
-
-    def _sizes_of_guards(self) -> list[Statement]:
-        """Statements for the row of each guard."""
-        found, variables = list[Statement](), [*self.symbols.x, self.symbols.t]
-        for place, guard in enumerate(self.watched):
-            sizes = [Absolute(derivative(guard, each)) for each in variables]
-            sizes.append(magnitude(guard, variables))
-            row = ORDER + (ROWS_OF_END + 1 + place)
-            found += assignments([at("out", row, i) for i in range(len(sizes))], sizes)
-        return found
 
 
 def magnitude(expression: Expression, variables: Sequence[Symbol]) -> Expression:
@@ -337,6 +245,60 @@ class AbreastTangents:
         for i, rights in enumerate(self.block.blocks.values()):
             found[f"{self.block.prefix}b{i}"] = place
             place += len(rights)
+        return found
+
+
+class AbreastBody(Body):
+    """The body of a mode for runs abreast; ``watched`` are the guards as functions of time and state."""
+
+    register = 1
+    recurrences = AbreastRecurrences
+    tangent_loop = AbreastTangents
+
+    def __init__(self, watched: Sequence[Expression], symbols: Symbols, *others: Any) -> None:
+        self.watched = watched
+        super().__init__(symbols, *others)
+
+    def _groups(self) -> Statement:
+        return put(GROUPS, call("length", "x") // self.n - 1)
+
+    def _orders(self, moved: Any, carried: Any) -> list[Statement]:
+        return [*moved.first(), *carried.first(), each_order([*moved.higher(), *carried.higher()])]
+
+    def _state(
+        self,
+        prefix: str,
+        names: Sequence[Symbol | None],
+        columns: list[int],
+        starts: list[Any],
+        rates: Sequence[Expression],
+        guards: Sequence[Expression],
+    ) -> AbreastLoop:
+        block = self._block(prefix)
+        block.expect(names, rates)
+        moved = AbreastLoop(names, columns, rates, starts, block)
+        moved.others = {self.n + place: block.coefficient(guard) for place, guard in enumerate(guards)}
+        return moved
+
+    def _place_pairs(self, moved: Any) -> dict[str, int]:
+        """The column of the second factor of each convolution, by name; it has a new one if it has none."""
+        block, places = moved.block, dict[str, int]()
+        for place, (_, right) in enumerate(block.pairs):
+            known = block.rows.get(right)
+            if not isinstance(known, int):
+                known = self.allot()
+                moved.factors[place] = known
+            places[f"{block.prefix}c{place}"] = known
+        return places
+
+    def _sizes(self) -> list[Statement]:
+        """Statements for the row of each guard."""
+        found, variables = list[Statement](), [*self.symbols.x, self.symbols.t]
+        for place, guard in enumerate(self.watched):
+            sizes = [Absolute(derivative(guard, each)) for each in variables]
+            sizes.append(magnitude(guard, variables))
+            row = ORDER + (ROWS_OF_END + 1 + place)
+            found += assignments([at("out", row, i) for i in range(len(sizes))], sizes)
         return found
 
 

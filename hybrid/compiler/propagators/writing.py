@@ -98,6 +98,11 @@ class Body:
         The coefficients of time from the first on, as a function of the prefix of the local variables.
     """
 
+    # Columns fill whole registers of so many numbers.
+    register = WIDE
+    recurrences = Recurrences
+    tangent_loop: Any = TangentLoop
+
     def __init__(
         self,
         symbols: Symbols,
@@ -108,15 +113,11 @@ class Body:
         self.symbols, self.time = symbols, time
         self.n = len(symbols.x)
         self.behind_guards = self.n + len(guards)
-        self.columns = self.first_columns()
+        self.columns = padded(self.behind_guards + OTHERS, self.register)
         self.rows = {symbol: self.allot() for symbol in others}
         self.constants = Constants()
         self.preamble: list[Statement] = []
         self.at_start: dict[Expression, Any] = {}
-
-    def first_columns(self) -> int:
-        """How many columns come first, in whole vectors."""
-        return padded(self.behind_guards + OTHERS, WIDE)
 
     def column(self, place: int) -> int:
         """A column after those of the guards."""
@@ -180,28 +181,33 @@ class Body:
         names, rates = [*names, None], [*rates, trace]
         columns, starts = [*columns, self.column(DIVERGENCE)], [*starts, 0.0]
         moved = self._state("a", names, columns, starts, rates, guards)
-        vectors = Recurrences(
+        vectors = self.recurrences(
             dict.fromkeys(seeds.values(), 0), None, self.allot, "b", self.constants, moved.block, lanes=True
         )
         vectors.expect(seeds.values(), tangents)
-        carried = TangentLoop(list(seeds.values()), vectors)
+        carried = self.tangent_loop(list(seeds.values()), vectors)
         carried.compute(tangents)
         placed = self._place_pairs(moved) | carried.places()
-        shared = [*self.preamble, *self.constants.statements(), put(o, 0)]
+        shared = [*self.preamble, *self.constants.statements(), *self._sizes(), put(o, 0)]
         return Series(
             (*named(places), *shared, *alone.first(), each_order(alone.higher())),
-            (
-                *named(placed),
-                groups(self.n),
-                *shared,
-                *moved.first(),
-                each_order(moved.higher()),
-                *carried.statements(),
-            ),
-            padded(max(width, self.columns), WIDE),
+            (*named(placed), self._groups(), *shared, *self._orders(moved, carried)),
+            padded(max(width, self.columns), self.register),
             0,
             carried.columns,
         )
+
+    def _groups(self) -> Statement:
+        """The statement that computes the number of groups of tangent vectors."""
+        return groups(self.n)
+
+    def _sizes(self) -> list[Statement]:
+        """Statements for what errors of the guards are judged by, besides the terms of their series."""
+        return []
+
+    def _orders(self, moved: Any, carried: Any) -> list[Statement]:
+        """Statements for all orders of the state and of the tangent vectors."""
+        return [*moved.first(), each_order(moved.higher()), *carried.statements()]
 
     def _state(
         self,

@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from hybrid.kernels.abreast.lanes import ROOM, STEPS, come_aboard, holds_roots, leave, order_of, places_in
+from hybrid.kernels.abreast.lanes import come_aboard, leave, places_in
 from hybrid.kernels.abreast.rows import bits_of, mask_of
 from hybrid.kernels.abreast.step import step_abreast
 from hybrid.kernels.arithmetic.bernstein import NO_ROOT
@@ -10,8 +10,8 @@ from hybrid.kernels.drive import Room, complete, keep_scale, prepare, reaches_on
 from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.guards.touch import forget_touches
 from hybrid.kernels.steps.field.late import is_late
-from hybrid.kernels.steps.series import land
-from hybrid.kernels.types.abreast import ONWARD, Abreast, Crew
+from hybrid.kernels.steps.series import holds_roots, land, order_of
+from hybrid.kernels.types.abreast import ONWARD, ROOM, STEPS, Abreast, Crew
 from hybrid.kernels.types.codes import (
     ABREAST,
     DESINGULARISED,
