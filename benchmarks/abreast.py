@@ -6,7 +6,6 @@ Processor time, the least of turns that alternate in one process. A row is a run
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import models
-from benchmarks.common import heading, table
+from benchmarks.common import heading, least_in_turns, table
 from hybrid import Taylor, simulate, simulate_many
 from hybrid.simulation.trajectory import start as begin
 from lyapunov import lyapunov_spectrum
@@ -39,19 +38,6 @@ CASES: dict[str, tuple[Callable[[], Any], tuple[float, ...], str | None, float]]
     "impact pair": (models.impact_pair, (0.2, 0.1), None, 200.0),
 }
 TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
-
-
-def least(runs: list[Callable[[], Any]], turns: int) -> list[float]:
-    """Seconds of processor time of each run, the least of turns that alternate."""
-    best = [np.inf] * len(runs)
-    for run in runs:
-        run()
-    for _ in range(turns):
-        for i, run in enumerate(runs):
-            begin = time.process_time()
-            run()
-            best[i] = min(best[i], time.process_time() - begin)
-    return best
 
 
 def many(system: Any, starts: np.ndarray, mode: str | None, span: float, solver: Any) -> Any:
@@ -80,7 +66,7 @@ def beside_single_runs(turns: int) -> None:
         end = [span]
         alone = partial(simulate, system, start, (0.0, span), mode=mode, samples=end)
         among = partial(many, system, starts, mode, span, Taylor())
-        one, other = least([alone, among], turns)
+        one, other = least_in_turns([alone, among], turns)
         facts = among().attrs
         share = facts["steps_together"] / max(1, facts["steps_together"] + facts["steps_alone"])
         lines.append(
@@ -101,7 +87,7 @@ def exponents(turns: int) -> None:
     lines = []
     for k in (1, 2, 4):
         alone = partial(lyapunov_spectrum, system, start, k=k, intervals=300, transient=0, mode="free")
-        one, other = least([alone, partial(rows, system, start, k, 300)], turns)
+        one, other = least_in_turns([alone, partial(rows, system, start, k, 300)], turns)
         lines.append(
             [str(k), f"{one / 300 * 1e6:.2f}", f"{other / 300 / ROWS * 1e6:.2f}", f"{one * ROWS / other:.1f}"]
         )
@@ -121,7 +107,7 @@ def accuracy(turns: int) -> dict[str, list[tuple[float, float]]]:
         solver = Taylor(rtol=rtol)
         alone = partial(simulate, system, start, (0.0, span), mode=mode, samples=[span], solver=solver)
         among = partial(many, system, starts, mode, span, solver)
-        seconds = least([alone, among], turns)
+        seconds = least_in_turns([alone, among], turns)
         times = [seconds[0] / 20 * 1e6, seconds[1] / 20 / ROWS * 1e6]
         errors = [np.abs(alone().x[-1] - exact).max(), float(np.abs(among().x_end.values - exact).max())]
         for name, time_, error in zip(found, times, errors, strict=True):

@@ -6,8 +6,7 @@ Run ``pip install '.[benchmarks]'``, then ``OMP_NUM_THREADS=1 python -m benchmar
 from __future__ import annotations
 
 import argparse
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
@@ -15,7 +14,7 @@ import attrs
 import heyoka as hy
 import numpy as np
 
-from benchmarks.common import heading, table
+from benchmarks.common import heading, least_in_turns, table
 from benchmarks.compile_time import CHAIN
 from benchmarks.peers import heyoka_taylor
 from benchmarks.problems import problems
@@ -24,23 +23,6 @@ from hybrid import Taylor, simulate
 TOLERANCES = (1e-10, 1e-12)
 # Masses of a chain, the time of a run, and the gap to the wall: without hits it is out of reach.
 CHAINS = ((10, 40.0, 0.5), (50, 7.0, 0.5), (50, 7.0, 100.0))
-# Shortest turn in seconds.
-TURN = 0.004
-
-
-def least(runs: Sequence[Callable[[], Any]], turns: int) -> list[float]:
-    """Seconds of processor time of each run: the least of turns that alternate."""
-    best = [np.inf] * len(runs)
-    for run in runs:
-        run()
-    for _ in range(turns):
-        for i, run in enumerate(runs):
-            begin, count = time.process_time(), 0
-            while time.process_time() - begin < TURN:
-                run()
-                count += 1
-            best[i] = min(best[i], (time.process_time() - begin) / count)
-    return best
 
 
 def heyoka_chain(masses: int, x0: np.ndarray, t_end: float, gap: float, tol: float) -> Callable[[], Any]:
@@ -85,7 +67,7 @@ def chains(turns: int) -> list[list[str]]:
 
             theirs = heyoka_chain(masses, x0, t_end, gap, tol)
             apart = np.abs(ours().x[-1] - theirs()).max()
-            one, other = least([ours, theirs], turns)
+            one, other = least_in_turns([ours, theirs], turns)
             cells = [str(2 * masses), f"{t_end:g}", str(ours().jump_count), f"{tol:.0e}"]
             rows.append(
                 [*cells, f"{1e3 * one:.3f}", f"{1e3 * other:.3f}", f"{other / one:.2f}", f"{apart:.0e}"]
@@ -115,7 +97,7 @@ def founding(turns: int) -> list[list[str]]:
             errors = [
                 np.abs(x - exact).max() / np.abs(exact).max() for x in (ours().x[-1], theirs(tol).state)
             ]
-            one, other = least([ours, lambda theirs=theirs, tol=tol: theirs(tol)], turns)
+            one, other = least_in_turns([ours, lambda theirs=theirs, tol=tol: theirs(tol)], turns)
             cells = [str(periods), f"{tol:.0e}", f"{1e3 * one:.3f}", f"{1e3 * other:.3f}"]
             rows.append([*cells, f"{other / one:.2f}", *(f"{error:.0e}" for error in errors)])
     return rows

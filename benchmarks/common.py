@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.metadata
+import math
 import os
 import platform
 import subprocess
@@ -14,6 +15,8 @@ from datetime import date
 from pathlib import Path
 from typing import NamedTuple
 
+# Shortest turn of a comparison, in seconds.
+TURN = 0.004
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("numpy", "scipy", "numba")
 
@@ -68,6 +71,21 @@ def least_time(work: Callable[[], object], repeats: int = 7) -> float:
         work()
         times.append(time.process_time() - start)
     return min(times)
+
+
+def least_in_turns(runs: Sequence[Callable[[], object]], turns: int) -> list[float]:
+    """Seconds of processor time of each run: the least of turns that alternate."""
+    best = [math.inf] * len(runs)
+    for run in runs:
+        run()
+    for _ in range(turns):
+        for i, run in enumerate(runs):
+            begin, count = time.process_time(), 0
+            while time.process_time() - begin < TURN:
+                run()
+                count += 1
+            best[i] = min(best[i], (time.process_time() - begin) / count)
+    return best
 
 
 class Process(NamedTuple):
