@@ -11,9 +11,10 @@ from hybrid.compiler.llvm.calls import CALLS, NUMBER, WHOLE
 from hybrid.compiler.llvm.lowering import TRUTH, Body, Signature
 from hybrid.compiler.llvm.waves import sine
 from hybrid.compiler.statements.code import LoweringError
-from hybrid.kernels.instructions.loops import declared, loop
-from hybrid.kernels.instructions.registers import Matrix, everywhere, multiply_add, vector_of
-from hybrid.kernels.types.codes import ABREAST
+from hybrid.kernels.instructions.columns import write_convolved
+from hybrid.kernels.instructions.loops import declared
+from hybrid.kernels.instructions.registers import Matrix, everywhere, joined, vector_of
+from hybrid.kernels.types.codes import ABREAST, NARROW
 
 ROW = vector_of(ABREAST)
 MASK = ir.VectorType(TRUTH, ABREAST)
@@ -27,8 +28,6 @@ OF_REGISTERS = {
 # Operations that are functions, and other functions of one number at a time.
 NAMED: Mapping[str, str] = {"%": "remainder", "**": "pow"}
 EACH = ("cos", "exp", "log", "log10", "log2", "pow", "sin")
-# So many sums at once stay in registers.
-MOST_SUMS = 12
 
 
 class AbreastBody(Body):
@@ -116,46 +115,16 @@ class AbreastBody(Body):
             raise LoweringError("a branch is taken by all runs abreast, or by none")
         super()._when(condition, body, other)
 
-    def _sums_of_products(
-        self, _: str, __: Any, order: Any, lefts: Any, rights: Any, whole: int
-    ) -> tuple[Any, ...]:
-        """``out[j, left] * out[order - j, right]``, summed over ``0 < j < order``, for several pairs.
-
-        The terms with the order before come last: they are known last. If the sums are ``whole`` they have
-        that with ``j = order``, too.
-        """
-        at, pairs = self.value(order), list(zip(lefts[1:], rights[1:], strict=True))
-        found: list[Any] = []
-        for first in range(0, len(pairs), MOST_SUMS):
-            found += self._some_sums(at, pairs[first : first + MOST_SUMS], whole)
-        return tuple(found)
-
-    def _some_sums(self, order: Any, pairs: Sequence[Any], whole: int) -> list[Any]:
-        builder, matrix, one = self.builder, self.values["out"], WHOLE(1)
-        columns = [[builder.mul(self.value(each), WHOLE(ABREAST)) for each in pair] for pair in pairs]
-        sums = [self.front.alloca(ROW) for _ in columns]
-        for each in sums:
-            builder.store(ROW([0.0] * ABREAST), each)
-
-        def entry(row: Any, column: Any) -> Any:
-            # LLVM reads a factor once that several products share.
-            return builder.load(matrix.address(row, column), align=8, typ=ROW)
-
-        def add_terms(place: Any) -> None:
-            other = builder.sub(order, place)
-            for (left, right), total in zip(columns, sums, strict=True):
-                term = entry(place, left), entry(other, right)
-                builder.store(multiply_add(builder, *term, builder.load(total)), total)
-
-        last = builder.add(order, one) if whole else builder.sub(order, one)
-        with loop(builder, WHOLE(2), last, one) as place:
-            add_terms(place)
-        with builder.if_then(builder.icmp_signed(">", order, WHOLE(0 if whole else 2))):
-            add_terms(one)
-        if not whole:
-            with builder.if_then(builder.icmp_signed(">", order, one)):
-                add_terms(builder.sub(order, one))
-        return [builder.load(each) for each in sums]
+    def _convolved(self, _: str, __: Any, order: Any, lefts: Any, rights: Any, known: int) -> tuple[Any, ...]:
+        """As ``convolved_pairs``, for the sums of two orders of several pairs."""
+        builder, found = self.builder, dict[str, Any]()
+        for each in (*lefts[1:], *rights[1:]):
+            # Pairs with one first factor have one value for it, and read it once.
+            found.setdefault(repr(each), builder.mul(self.value(each), WHOLE(ABREAST)))
+        firsts, seconds = ([found[repr(each)] for each in terms[1:]] for terms in (lefts, rights))
+        widths, at, fours = [ABREAST] * len(firsts), self.value(order), ABREAST // NARROW
+        sums = write_convolved(builder, self.values["out"], at, firsts, seconds, widths, known, pairs=True)
+        return tuple(joined(builder, sums[i : i + fours]) for i in range(0, len(sums), fours))
 
     def _call(self, name: str, terms: Sequence[Any]) -> Any:
         if name not in CALLS or not (CALLS[name].on_numbers or name in OF_REGISTERS or name in EACH):
@@ -191,7 +160,7 @@ class AbreastBody(Body):
     TERMS: ClassVar[dict[str, Callable[..., Any]]] = {
         **Body.TERMS,
         **dict.fromkeys(("+", "-", "*", "/", "//", "**", "%"), _arithmetic),
-        "sums_of_products": _sums_of_products,
+        "convolved": _convolved,
         "at": _at,
         "listed": _listed,
         "get": _get,

@@ -7,7 +7,8 @@ no table here: that would be one of each run.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import cached_property
 from typing import Any
 
 from hybrid.compiler.emitted import Propagator, Series
@@ -16,16 +17,15 @@ from hybrid.compiler.propagators.equations import Boundary, Equations, equations
 from hybrid.compiler.propagators.rooted import regular_roots, write_rooted
 from hybrid.compiler.propagators.writing import (
     Body,
-    each_order,
     harmonics_of,
     names_of_state,
     seeds_of,
     write_series,
 )
-from hybrid.compiler.statements.code import Statement, at, call, get, loop, put, several
+from hybrid.compiler.statements.code import Code, Statement, at, call, get, less, put, several, when
 from hybrid.compiler.statements.values import assignments
-from hybrid.compiler.taylor.convolutions import below_highest
-from hybrid.compiler.taylor.loops import GROUPS, VECTORS, StateLoop
+from hybrid.compiler.taylor.convolutions import InRegisters
+from hybrid.compiler.taylor.loops import GROUPS, StateLoop, TangentLoop
 from hybrid.compiler.taylor.series import ONE_THEN_ZERO, ORDER, OUT, NoSeries, Recurrences, o
 from hybrid.expression.derivatives import derivative, directional, divergence
 from hybrid.expression.graph import all_replaced, degree_of, is_negative, is_whole, replaced
@@ -141,6 +141,55 @@ class AbreastRecurrences(Recurrences):
         return get("v") + get(f"{self.prefix}b{place[0]}") + place[1]
 
 
+class AbreastSums(InRegisters):
+    """The sums of convolutions, each in a register of its own."""
+
+    nothing = 0.0
+
+    def __init__(self, block: Recurrences) -> None:
+        self.block = block
+
+    def inner(self) -> list[Statement]:
+        """Give each convolution its name, with the term of a first factor that is a component."""
+        block, found = self.block, list[Statement]()
+        for i, (pair, total) in enumerate(zip(block.pairs, self._totals(), strict=True)):
+            if pair in block.led:
+                total = total + block.led[pair] * at("out", 0, block.beside(i))
+            found.append(put(block.inner(i), total))
+        return found
+
+    def keep(self) -> list[Statement]:
+        """Keep the newest coefficients."""
+        return self._kept("p", list(self.block.pairs.values()))
+
+    def _names(self, letter: str) -> list[Code]:
+        return [get(f"{self.block.prefix}{letter}{i}") for i in range(len(self.block.pairs))]
+
+    def _totals(self) -> Iterator[Code]:
+        return iter(self._names("t"))
+
+    def _kept(self, letter: str, values: Sequence[Any]) -> list[Statement]:
+        return [put(*each) for each in zip(self._names(letter), values, strict=True)]
+
+    def _next(self, order: Any) -> list[Statement]:
+        names = self._names("t") + self._names("u")
+        if not names:
+            return []
+        lefts = several([left for left, _ in self.block.pairs])
+        rights = several([self.block.beside(i) for i in range(len(self.block.pairs))])
+        return [put(several(names), call("convolved", OUT, order, lefts, rights, 0))]
+
+    def _ends(self, order: Any, distance: int) -> list[Statement]:
+        first, last = list[Statement](), list[Statement]()
+        sums, newest = self._names("tu"[distance - 1]), self._names("p")
+        for i, (left, _) in enumerate(self.block.pairs):
+            first.append(put(sums[i], sums[i] + at("out", distance, left) * newest[i]))
+            other = at("out", distance, self.block.beside(i))
+            last.append(put(sums[i], sums[i] + at("out", o - 1, left) * other))
+        # The two terms may be one.
+        return [*first, when(less(2 * distance, order), last)] if first else []
+
+
 class AbreastLoop(StateLoop):
     """The loop of the state.
 
@@ -157,95 +206,47 @@ class AbreastLoop(StateLoop):
         self.others: dict[int, Any] = {}
         self.factors: dict[int, int] = {}
 
-    def first(self) -> list[Statement]:
-        """Statements for order zero."""
-        begin = [put(name, start) for name, start in zip(self.names.values(), self.starts, strict=True)]
-        return [*begin, *self._state(), *self.block.first, *self._stored(), *self._rates()]
+    @cached_property
+    def sums(self) -> AbreastSums:
+        """How the convolutions are summed."""
+        return AbreastSums(self.block)
 
-    def higher(self) -> list[Statement]:
-        """Statements for order ``o``; ``shrink`` is 1/o."""
-        block = self.block
-        step = [put(name, get("shrink") * self._rate(i)) for i, name in enumerate(self.names.values())]
-        rights = [block.beside(i) for i in range(len(block.pairs))]
-        inner = [block.inner(i) for i in range(len(rights))]
-        sums = products(inner, [left for left, _ in block.pairs], rights)
-        # The term with a first factor that is a component of the state is known by now.
-        led = [
-            put(inner[i], inner[i] + block.led[pair] * at("out", 0, rights[i]))
-            for i, pair in enumerate(block.pairs)
-            if pair in block.led
-        ]
-        return [*sums, *step, *led, *self._state(), *block.higher, *self._stored(), *self._rates()]
-
-    def _state(self) -> list[Statement]:
-        return [put(at("out", o, target), name) for target, name in self.names.items()]
-
-    def _stored(self) -> list[Statement]:
+    def _known(self, statements: Sequence[Statement]) -> list[Statement]:
+        """What is done once the components of an order are known."""
         values = list(self.block.pairs.values())
         columns = self.others | {column: values[place] for place, column in self.factors.items()}
-        return [put(at("out", o, column), value) for column, value in columns.items()]
+        components = [put(at("out", o, target), name) for target, name in self.names.items()]
+        stored = [put(at("out", o, column), value) for column, value in columns.items()]
+        return [*components, *statements, *stored, *self._rates()]
 
 
-class AbreastTangents:
-    """Statements for the series of the tangent vectors of each run, one after the other."""
+class AbreastTangents(TangentLoop):
+    """Statements for the series of the tangent vectors of each run, one vector after the other."""
 
-    def __init__(self, seeds: Sequence[Symbol], block: Recurrences) -> None:
-        self.components, self.block = len(seeds), block
-        self.values: list[Any] = []
-        block.rows |= {seed: get("v") + i for i, seed in enumerate(seeds)}
+    width, whole, nothing = 1, 1, 0.0
 
-    def compute(self, rates: Sequence[Expression]) -> None:
-        """Write the recurrences of the rates; this also requests the series of the state that they need."""
-        self.values = [self.block.coefficient(rate) for rate in rates]
+    def _lanes(self, rate: Expression) -> Any:
+        return self.block.coefficient(rate)
 
-    @property
-    def columns(self) -> int:
-        """Number of columns that a tangent vector needs."""
-        return self.components + len(self.block.pairs)
+    def _spread(self) -> list[Statement]:
+        return []
 
-    def first(self) -> list[Statement]:
-        """Statements for order zero, and for order one of the vectors themselves."""
-        begun = [
-            put(at("out", 0, get("v") + i), at("x", (get("g") + 1) * self.components + i))
-            for i in range(self.components)
-        ]
-        return self._each([*begun, *self.block.first, *self._stored(), *self._later(1, 1.0)])
-
-    def higher(self) -> list[Statement]:
-        """Statements for order ``o``, and for order ``o + 1`` of the vectors themselves."""
-        block, names, lefts, rights = self.block, list[Any](), list[Any](), list[Any]()
-        for i, (left, factors) in enumerate(block.blocks.items()):
-            for place in range(len(factors)):
-                names.append(block.inner(i, place))
-                lefts.append(left)
-                rights.append(block.beside(i, place))
-        # All orders of the other factors are known: those of the state.
-        sums = products(names, lefts, rights, whole=1)
-        later = [put(get("later"), 1.0 / (o + 1))]
-        each = [*sums, *block.higher, *self._stored(), *self._later(o + 1, get("later"))]
-        return below_highest([*later, *self._each(each)])
-
-    def _stored(self) -> list[Statement]:
-        block = self.block
-        return [
-            put(at("out", o, block.beside(i, place)), block.pairs[left, right])
-            for i, (left, rights) in enumerate(block.blocks.items())
-            for place, right in enumerate(rights)
-        ]
-
-    def _later(self, order: Any, scale: Any) -> list[Statement]:
-        return [put(at("out", order, get("v") + i), scale * value) for i, value in enumerate(self.values)]
-
-    def _each(self, statements: Any) -> list[Statement]:
-        return [loop("g", 0, GROUPS, [put(get("v"), VECTORS + get("g") * self.columns), *statements])]
-
-    def places(self) -> dict[str, int]:
-        """By name: where the operands of products with a common factor begin, counted from ``v``."""
-        found, place = {}, self.components
-        for i, rights in enumerate(self.block.blocks.values()):
-            found[f"{self.block.prefix}b{i}"] = place
-            place += len(rights)
+    def _begin(self) -> list[Statement]:
+        first, found = (get("g") + 1) * len(self.names), list[Statement]()
+        for i, name in enumerate(self.names):
+            found += [put(name, at("x", first + i)), self._keep(0, get("v") + i, name)]
         return found
+
+    def _convolved(self, blocks: Sequence[tuple[int, Any, list[Expression]]]) -> Code:
+        pairs = [(left, self.block.beside(i, k)) for i, left, rights in blocks for k in range(len(rights))]
+        lefts, rights = zip(*pairs, strict=True)
+        return call("convolved", OUT, o + 1, several(lefts), several(rights), 1)
+
+    def _row(self, block: int, names: Sequence[Code]) -> list[Statement]:
+        return [self._keep(o, self.block.beside(block, k), name) for k, name in enumerate(names)]
+
+    def _keep(self, order: Any, column: Any, value: Any) -> Statement:
+        return put(at("out", order, column), value)
 
 
 class AbreastBody(Body):
@@ -261,9 +262,6 @@ class AbreastBody(Body):
 
     def _groups(self) -> Statement:
         return put(GROUPS, call("length", "x") // self.n - 1)
-
-    def _orders(self, moved: Any, carried: Any) -> list[Statement]:
-        return [*moved.first(), *carried.first(), each_order([*moved.higher(), *carried.higher()])]
 
     def _state(
         self,
@@ -300,16 +298,3 @@ class AbreastBody(Body):
             row = ORDER + (ROWS_OF_END + 1 + place)
             found += assignments([at("out", row, i) for i in range(len(sizes))], sizes)
         return found
-
-
-def products(
-    names: Sequence[Any], lefts: Sequence[Any], rights: Sequence[Any], whole: int = 0
-) -> list[Statement]:
-    """The statement for sums of products of two columns, without the first term, if there are any.
-
-    The last term, with order ``o`` of the left column, is left out unless they are to be ``whole``.
-    """
-    if not names:
-        return []
-    sums = call("sums_of_products", OUT, o, several(lefts), several(rights), whole)
-    return [put(several(names), sums)]

@@ -120,9 +120,11 @@ class InRegisters(InMemory):
     read what was just written takes longer than all else in an order.
     """
 
+    nothing: Any = call("four_times", 0.0)
+
     def first(self) -> list[Statement]:
         """Statements for order zero: no sum has terms yet."""
-        return [put(name, call("four_times", 0.0)) for name in self._names("t") + self._names("u")]
+        return [put(name, self.nothing) for name in self._names("t") + self._names("u")]
 
     def inner(self) -> list[Statement]:
         """Give each convolution its name, with the term of a first factor that is a component."""

@@ -111,9 +111,13 @@ class TangentLoop:
     ``InRegisters``, with one register for each product.
     """
 
+    # Columns of a register, and what the operands of each common factor begin on.
+    width, whole = NARROW, WIDE
+    nothing: Any = call("four_times", 0.0)
+
     def __init__(self, seeds: Sequence[Symbol], block: Recurrences) -> None:
         self.names = [get(f"{block.prefix}v{i}") for i in range(len(seeds))]
-        block.rows |= {seed: get("v") + NARROW * i for i, seed in enumerate(seeds)}
+        block.rows |= {seed: get("v") + self.width * i for i, seed in enumerate(seeds)}
         block.variables |= dict(zip(seeds, self.names, strict=True))
         self.block = block
         self.values: list[Any] = []
@@ -137,11 +141,10 @@ class TangentLoop:
         return {f"{self.block.prefix}b{i}": begin for i, begin in enumerate(self._begins()[:-1])}
 
     def statements(self) -> list[Statement]:
-        """The series of all vectors, four at a time."""
+        """The series of all vectors, one register after the other."""
         block, scale = self.block, get("later")
-        start = [put(get("v"), VECTORS + get("g") * self.columns), put(o, 0)]
-        start += [put(name, call("load", OUT, 0, get("v") + NARROW * i)) for i, name in enumerate(self.names)]
-        start += [put(name, call("four_times", 0.0)) for letter in "tu" for name in self._products(letter)]
+        start = [put(get("v"), VECTORS + get("g") * self.columns), put(o, 0), *self._begin()]
+        start += [put(name, self.nothing) for letter in "tu" for name in self._products(letter)]
         first = [*block.first, *self._rows(), *self._step(1, 1.0)]
         higher = [
             put(scale, reciprocal(o + 1)),
@@ -150,16 +153,23 @@ class TangentLoop:
             *self._rows(),
             *self._step(o + 1, scale),
         ]
-        return [
-            do("spread_tangents", get("x"), len(self.names), OUT, VECTORS, self.columns),
-            loop("g", 0, GROUPS, [*start, *first, loop("o", 1, ORDER, higher)]),
-        ]
+        series = loop("g", 0, GROUPS, [*start, *first, loop("o", 1, ORDER, higher)])
+        return [*self._spread(), series]
+
+    def _spread(self) -> list[Statement]:
+        """Write all vectors to where their series begin."""
+        return [do("spread_tangents", get("x"), len(self.names), OUT, VECTORS, self.columns)]
+
+    def _begin(self) -> list[Statement]:
+        """Take the vectors of one register from there."""
+        places = enumerate(self.names)
+        return [put(name, call("load", OUT, 0, get("v") + self.width * i)) for i, name in places]
 
     def _begins(self) -> list[int]:
-        """Where the operands of each common factor begin, and the end; all begin on the widest registers."""
-        found = [padded(NARROW * len(self.names), WIDE)]
+        """Where the operands of each common factor begin, and the end."""
+        found = [padded(self.width * len(self.names), self.whole)]
         for rights in self.block.blocks.values():
-            found.append(found[-1] + padded(NARROW * len(rights), WIDE))
+            found.append(found[-1] + padded(self.width * len(rights), self.whole))
         return found
 
     def _products(self, letter: str) -> list[Code]:
@@ -179,13 +189,16 @@ class TangentLoop:
         begun, k = list[Statement](), 0
         for blocks in self._together():
             names = slice(k, k + sum(len(rights) for _, _, rights in blocks))
-            lefts = several([left for _, left, _ in blocks])
-            begins = several([block.beside(i, 0) for i, _, _ in blocks])
-            widths = several([NARROW * len(rights) for _, _, rights in blocks])
-            sums = call("convolved", OUT, o + 1, lefts, begins, widths, 1)
-            begun.append(put(several(t[names] + u[names]), sums))
+            begun.append(put(several(t[names] + u[names]), self._convolved(blocks)))
             k = names.stop
         return [*found, *in_turn([when(less(o + 1, ORDER), begun)], onwards)] if found else []
+
+    def _convolved(self, blocks: Sequence[tuple[int, Any, list[Expression]]]) -> Code:
+        """The sums of two orders of all products in some blocks."""
+        lefts = several([left for _, left, _ in blocks])
+        begins = several([self.block.beside(i, 0) for i, _, _ in blocks])
+        widths = several([NARROW * len(rights) for _, _, rights in blocks])
+        return call("convolved", OUT, o + 1, lefts, begins, widths, 1)
 
     def _together(self) -> list[list[tuple[int, Any, list[Expression]]]]:
         """The blocks that are summed in one loop: all of them, or each alone.
@@ -208,16 +221,24 @@ class TangentLoop:
         for i, (left, rights) in enumerate(block.blocks.items()):
             names = [next(kept) for _ in rights]
             found += [put(name, block.pairs[left, right]) for name, right in zip(names, rights, strict=True)]
-            if self._is_small:
-                found.append(do("store_row", OUT, o, block.beside(i, 0), several(names)))
-            else:
-                found += [do("store", OUT, o, block.beside(i, k), name) for k, name in enumerate(names)]
+            found += self._row(i, names)
         return found
+
+    def _row(self, block: int, names: Sequence[Code]) -> list[Statement]:
+        """Write the operands of a block."""
+        beside = self.block.beside
+        if self._is_small:
+            return [do("store_row", OUT, o, beside(block, 0), several(names))]
+        return [self._keep(o, beside(block, k), name) for k, name in enumerate(names)]
+
+    def _keep(self, order: Any, column: Any, value: Any) -> Statement:
+        """Write a register to its column."""
+        return do("store", OUT, order, column, value)
 
     def _step(self, order: Any, scale: Any) -> list[Statement]:
         """The vectors of an order from their rates in the order before."""
         rates = [get(f"{self.block.prefix}r{i}") for i in range(len(self.names))]
         found = [put(*each) for each in zip(rates, self.values, strict=True)]
         for i, (name, rate) in enumerate(zip(self.names, rates, strict=True)):
-            found += [put(name, scale * rate), do("store", OUT, order, get("v") + NARROW * i, name)]
+            found += [put(name, scale * rate), self._keep(order, get("v") + self.width * i, name)]
         return found

@@ -53,7 +53,7 @@ def _convolution(builder, rows, order, blocks, known, pairs):
         # As many as have room in the registers: two orders in parts, and two factors.
         count, needed, seen = 0, 0, set()
         for i, place, _ in waiting:
-            factor = (i, place) if pairs else i
+            factor = (blocks[i][0], place) if pairs else blocks[i][0]
             needed += 2 * PARTS + (0 if factor in seen else 2)
             seen.add(factor)
             if count and needed > room:
@@ -67,34 +67,39 @@ def _sums_at_once(builder, rows, order, blocks, registers, known, pairs):
     """One loop over the rows: each row is read once for both orders, since reading takes most of the time."""
     number = order.type
     begin, one = number(0 if known else 2), number(1)
-    used = sorted({i for i, _, _ in registers})
-    factors = {i: rows.walker(builder.sub(order, begin), blocks[i][0]) for i in used}
-    others = {i: rows.walker(begin, blocks[i][1]) for i in used}
+    others = {i: rows.walker(begin, blocks[i][1]) for i in sorted({i for i, _, _ in registers})}
+    # What each register is multiplied by: registers may share it.
+    keys = [(blocks[i][0], place if pairs else 0, width) for i, place, width in registers]
+    factors = {left: rows.walker(builder.sub(order, begin), left) for left, _, _ in keys}
 
     def factors_at(addresses):
         if pairs:
-            return [read(builder, rows.beside(addresses[i], place), width) for i, place, width in registers]
-        singles = {i: builder.load(address, typ=NUMBER) for i, address in addresses.items()}
-        spread = {(i, width): everywhere(builder, singles[i], width) for i, _, width in registers}
-        return [spread[i, width] for i, _, width in registers]
+            return {
+                (left, place, width): read(builder, rows.beside(addresses[left], place), width)
+                for left, place, width in dict.fromkeys(keys)
+            }
+        singles = {left: builder.load(address, typ=NUMBER) for left, address in addresses.items()}
+        return {key: everywhere(builder, singles[key[0]], key[2]) for key in dict.fromkeys(keys)}
 
     nothing = [vector_of(width)([0.0] * width) for *_, width in registers]
     # The factor that the next order has where this order has the one of the row before.
-    before = nothing
+    before = dict(zip(keys, nothing, strict=True))
     if known:
-        before = factors_at({i: rows.address(builder.add(order, one), blocks[i][0]) for i in used})
-    before = [variable(builder, each) for each in before]
+        before = factors_at({left: rows.address(builder.add(order, one), left) for left in factors})
+    before = {key: variable(builder, each) for key, each in before.items()}
     totals = [[[variable(builder, each) for each in nothing] for _ in range(2)] for _ in range(PARTS)]
     terms = builder.sub(builder.sub(order, one), begin)
     with loop(builder, number(0), builder.ashr(terms, one), one):
         for this, next_one in totals:
             sources = {i: rows.walk(other, 1) for i, other in others.items()}
-            newer = factors_at({i: rows.walk(factor, -1) for i, factor in factors.items()})
+            newer = factors_at({left: rows.walk(factor, -1) for left, factor in factors.items()})
             for k, (i, place, width) in enumerate(registers):
                 term = read(builder, rows.beside(sources[i], place), width)
-                for total, factor in ((this[k], newer[k]), (next_one[k], builder.load(before[k]))):
+                two = (this[k], newer[keys[k]]), (next_one[k], builder.load(before[keys[k]]))
+                for total, factor in two:
                     builder.store(multiply_add(builder, factor, term, builder.load(total)), total)
-                builder.store(newer[k], before[k])
+            for key, factor in newer.items():
+                builder.store(factor, before[key])
     for k, (i, place, _) in enumerate(registers):
         parts = [[builder.load(part[which][k]) for part in totals] for which in range(2)]
         yield i, place, [builder.fadd(*each) for each in parts]

@@ -133,6 +133,15 @@ def parted(builder, vector):
     return [vector] if count == NARROW else [builder.shuffle_vector(vector, nothing, each) for each in places]
 
 
+def joined(builder, parts):
+    """The register that holds those of four numbers."""
+    while len(parts) > 1:
+        count = 2 * parts[0].type.count
+        pairs = zip(parts[::2], parts[1::2], strict=True)
+        parts = [builder.shuffle_vector(*each, lane_numbers(0, count)) for each in pairs]
+    return parts[0]
+
+
 def whole_registers(width, register):
     """``width`` columns, rounded up to whole vector registers of ``register`` columns."""
     return (width + register - 1) // register * register
