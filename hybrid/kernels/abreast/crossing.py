@@ -38,9 +38,13 @@ SLOW_BANDS = 64.0
 # Two crossings closer than this share of the step, or than what so many bands hide, are taken for one.
 APART = 1e-9
 ZERO_BANDS = 4.0
-# Steps of Newton's method, and the change, as a share of the place, below which it is rounding.
+# Steps of Newton's method, with the first powers and with all; and the change, as a share of the place, below
+# which it is rounding.
+APPROACHES = 3
 MOST_CORRECTIONS = 16
 AT_ROOT = 4.0 * EPSILON
+# What a landing has left of a guard may move the next one by this share of the time between them.
+MOST_LEFT = 0.1
 # A guard is far from zero if it is so many bands away.
 DISTANT = 1e3
 
@@ -110,34 +114,53 @@ def leading_powers(sea, column, order, size, known, h):
 
 
 @njit(**INLINE)
+def corrected(over, under, side, x, low, high):
+    """A place by Newton's method, halfway if that is not in the bracket; whether it is, and the bracket."""
+    before = over * side > 0.0
+    low, high = where(before, x, low), where(before, high, x)
+    nearer = x - over / under
+    inside = both(nearer >= low, nearer <= high)
+    return where(inside, nearer, 0.5 * (low + high)), inside, low, high
+
+
+@njit(**INLINE)
 def root_in(sea, column, order, known, side, begin, length, h, found):
-    """The root of a guard on a piece, as a share of the step, its slope there, and the runs that have it."""
+    """The root of a guard on a piece, as a share of the step, its slope there, and the runs that have it.
+
+    The powers in ``sea.polynomial`` tell where to begin.
+    """
     powers, low, high = sea.powers, begin, begin + length
-    x, start = fused(length, 0.5, begin), entry_at(powers, 0, column)
-    settled, slope = without(found, found), in_every_run(1.0)
+    x, start = fused(length, 0.5, begin), where(known, entry_at(powers, 0, column), 0.0)
+    for _ in range(APPROACHES):
+        value, rate = rows_at(sea.polynomial, DEGREE), in_every_run(0.0)
+        for i in range(DEGREE - 1, -1, -1):
+            rate = fused(rate, x, value)
+            value = fused(value, x, rows_at(sea.polynomial, i))
+        x, _, low, high = corrected(value, rate, side, x, low, high)
+    low, high = begin, begin + length
+    settled, slope, last = without(found, found), in_every_run(1.0), in_every_run(0.0)
     for _ in range(MOST_CORRECTIONS):
         place = x * h
         value, rate = entry_at(powers, order, column), in_every_run(0.0)
         for o in range(order - 1, -1, -1):
             rate = fused(rate, place, value)
             value = fused(value, place, entry_at(powers, o, column))
-        rate = rate * h
-        # A guard that is zero at the start is divided by its variable, until the end.
-        divided = (value - start) / x
-        value = where(known, divided, value)
-        rate = where(known, (rate - divided) / x, rate)
-        slope = where(settled, slope, rate)
-        before = value * side > 0.0
-        low, high = where(before, x, low), where(before, high, x)
-        nearer = x - value / rate
-        inside = both(nearer >= low, nearer <= high)
-        nearer = where(inside, nearer, 0.5 * (low + high))
+        value, rate = value - start, rate * h
+        # A guard that is zero at the start is divided by its variable.
+        over, under = where(known, value * x, value), where(known, fused(rate, x, -value), rate)
+        slope = where(settled, slope, under)
+        nearer, inside, low, high = corrected(over, under, side, x, low, high)
         shift = magnitude(nearer - x)
         x = where(settled, x, nearer)
-        settled = either(settled, both(inside, shift <= AT_ROOT * x))
+        # Newton's corrections go with the square of the one before: so much the next one would be.
+        close = shift * shift * shift <= AT_ROOT * x * last * last
+        settled, last = either(settled, both(inside, close)), shift
         if bits_of(without(found, settled)) == 0:
             break
-    return x, slope, both(found, settled)
+    # What has been left of a guard that counts as zero is made up for.
+    left = start / slope
+    x = where(magnitude(left) < MOST_LEFT, x - left * x, x)
+    return x, where(known, slope / (x * x), slope), both(found, settled)
 
 
 @njit(**INLINE)
