@@ -80,8 +80,8 @@ def saltation_of(model, fired, transversality, work):
 
 @njit(**INLINE)
 def log_determinant_of(matrix, scratch, n):
-    """``log |det|`` of a matrix, or minus infinity if a pivot may be rounding."""
-    total, largest = 0.0, 0.0
+    """``log |det|`` of a matrix; minus infinity if a pivot may be rounding, or the product is no float."""
+    total, largest = 1.0, 0.0
     for i in range(n):
         for j in range(n):
             scratch[i, j] = matrix[i, j]
@@ -96,12 +96,12 @@ def log_determinant_of(matrix, scratch, n):
             return -math.inf
         for j in range(c, n if pivot != c else 0):
             scratch[c, j], scratch[pivot, j] = scratch[pivot, j], scratch[c, j]
-        total += math.log(size)
+        total *= size
         for i in range(c + 1, n):
             factor = scratch[i, c] / scratch[c, c]
             for j in range(c + 1, n if factor != 0.0 else 0):
                 scratch[i, j] -= factor * scratch[c, j]
-    return total
+    return math.log(total) if 0.0 < total < math.inf else -math.inf
 
 
 @njit(**INLINE)

@@ -13,7 +13,7 @@ from numba import njit
 from hybrid.kernels.events.guards import guard_acceleration, guard_speed, guard_value, rounding_band
 from hybrid.kernels.jumps.past import fired_before
 from hybrid.kernels.limit.endless import mark_endless
-from hybrid.kernels.limit.rounds import NO_SERIES, Series
+from hybrid.kernels.limit.rounds import NO_SERIES, Series, shortens
 from hybrid.kernels.types.codes import ENDLESS, IMPULSE, LIMIT
 from hybrid.kernels.types.options import KERNEL
 
@@ -36,7 +36,7 @@ def series_of_impacts(model, run, transition, work):
     n, ratio, side = model.dimension, run.restitution, -far_side(model, run, transition)
     t, follows = run.phase, run.chatter_jumps + 1 == run.jumps and fired_before(run, 1) == transition
     earlier, run.chattering = run.chattering if follows else 0, 0
-    if not 0.0 < ratio < 1.0:
+    if not 0.0 < ratio < 1.0 or (run.jumps > 2 and not shortens(model, run, 1)):
         return NO_SERIES
     model.field(run.mode, t, run.y, model.parameters, work.field)
     speed = side * guard_speed(model, transition, t, run.y, work.field, work.gradient)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from numba import njit
 
-from hybrid.kernels.events.guards import rounding_band
+from hybrid.kernels.events.guards import rounding_band, size_of_time
 from hybrid.kernels.jumps.past import fired_before, time_before, visit_before
 from hybrid.kernels.types.codes import ENDLESS, LIMIT
 from hybrid.kernels.types.layout import EPSILON
@@ -25,6 +25,8 @@ STEADY = 0.1
 # The share of a quantity that counts as nothing at a limit: of the time, what is left; of the state, how far
 # it may be from the guards, and how far the resets may move it. An extrapolation errs by its square.
 RESOLVED = 1e-6
+# The share of a time by which rounding moves the time between two jumps.
+HIDDEN = 4.0 * EPSILON
 
 
 class Series(NamedTuple):
@@ -47,12 +49,11 @@ class Series(NamedTuple):
 NO_SERIES = Series(0, 0, 0.0, 0.0, 0.0, 0.0)
 
 
-@njit(**KERNEL)
-def shortens(model, run):
-    """Whether the last two jumps took less time than the two before them."""
-    if run.jumps <= FEWEST_ROUNDS:
-        return False
-    return time_before(model, run, 0, 2) < (1.0 - RESOLVED) * time_before(model, run, 2, 4)
+@njit(**INLINE)
+def shortens(model, run, turn):
+    """Whether the last ``turn`` jumps took less time than those before them, or rounding may hide it."""
+    before, hidden = time_before(model, run, turn, 2 * turn), HIDDEN * size_of_time(model, run.phase)
+    return time_before(model, run, 0, turn) - hidden < (1.0 - RESOLVED) * before
 
 
 @njit(**KERNEL)
@@ -90,16 +91,20 @@ def fewest_jumps(turn):
 @njit(**KERNEL)
 def series_of_rounds(model, run):
     """The series of transitions that fire in turn; impacts on one guard have a better one of their own."""
-    if not shortens(model, run):
+    if run.jumps <= FEWEST_ROUNDS or not shortens(model, run, 2):
         return NO_SERIES
     known = min(run.jumps, run.visits.shape[0])
     for turn in range(2 if run.chattering > 0 else 1, (known - 1) // FEWEST_ROUNDS + 1):
+        if fired_before(run, 0) != fired_before(run, turn):
+            continue
+        left, ratio = time_left_of_rounds(model, run, turn, 0)
+        if not left > 0.0:
+            continue
         jumps = jumps_in_turn(run, turn, min(known, fewest_jumps(turn)))
         if jumps <= FEWEST_ROUNDS * turn:
             continue
-        left, ratio = time_left_of_rounds(model, run, turn, 0)
         earlier, _ = time_left_of_rounds(model, run, turn, turn)
-        if left > 0.0 and earlier > 0.0:
+        if earlier > 0.0:
             latest = time_before(model, run, 0, turn)
             return Series(turn, jumps, ratio, latest, left, left + latest - earlier)
     return NO_SERIES
