@@ -61,7 +61,7 @@ def moved(values):
 
 
 def _install():
-    begin, starts = memory.Memory.begin, memory.Starts
+    begin, replace = memory.Memory.begin, memory.Starts.replace
     find, values = Variables.parameter_values, Rows.values
     time_span, increasing_times = arguments.time_span, arguments.increasing_times
 
@@ -81,7 +81,7 @@ def _install():
     Rows.values = wraps(values)(
         lambda self, point: values(self, {name: float(moved(number)) for name, number in point.items()})
     )
-    memory.Starts = lambda *, origins, **others: starts(origins=moved(origins), **others)
+    memory.Starts.replace = lambda self, *, origins, **others: replace(self, origins=moved(origins), **others)
     Variables.parameter_values = wraps(find)(lambda self, overrides=None: moved(find(self, overrides)))
     arguments.time_span = wraps(time_span)(lambda name, value: tuple(moved(time_span(name, value)).tolist()))
     arguments.increasing_times = wraps(increasing_times)(

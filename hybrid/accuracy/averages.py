@@ -8,6 +8,7 @@ mean converges like ``1/M``, not ``1/sqrt(M)``. The textbook ``std / sqrt(M)`` i
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,6 +115,7 @@ def merged(series: Array, size: int) -> Array:
     return series[len(series) - count * size :].reshape(count, size, *series.shape[1:]).mean(axis=1)
 
 
+@lru_cache(64)
 def _cosines(count: int, nu: int) -> Array:
     """Rows 1 to ``nu`` of the orthonormal discrete cosine transform of type II; row 0 is the constant."""
     i, j = np.arange(count) + 0.5, np.arange(1, nu + 1)
@@ -132,10 +134,6 @@ def _autoregressive_spectrum(r: Array, count: int, nu: int) -> Array:
     """Mean of an AR(1) spectrum over the first ``nu`` cosine frequencies, relative to frequency zero."""
     angle = np.pi / count * np.arange(1, nu + 1).reshape(-1, *(1,) * r.ndim)
     return ((1.0 - r) ** 2 / (1.0 - 2.0 * r * np.cos(angle) + r**2)).mean(axis=0)
-
-
-# Of the places in a series: three sums with these weights give the tapered mean.
-POWERS = np.array([[2.0], [3.0], [4.0]])
 
 
 class TaperedMean:
@@ -172,7 +170,11 @@ class TaperedMean:
         if collapsed.any():
             self._collapsed |= collapsed.any(axis=0)
             rows = np.where(collapsed, 0.0, rows)
-        self._moments += (np.arange(len(rows)) + (self.count + 0.5)) ** POWERS @ rows
+        place = np.arange(len(rows)) + (self.count + 0.5)
+        square = place * place
+        # Three sums give the tapered mean, with these powers of the place in the series as weights.
+        for moment, weight in zip(self._moments, (square, square * place, square * square), strict=True):
+            moment += weight @ rows
         self.count += len(rows)
 
     def value(self) -> Array:

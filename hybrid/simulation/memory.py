@@ -46,22 +46,7 @@ def memory_for_records() -> float:
 
 def workspace(method: Any, dimension: int, tangents: int, columns: int, rows: int = 0) -> Any:
     """Scratch memory for one run; ``columns`` are those of series, ``rows`` those of the guards' programs."""
-    layout = work_layout(method, dimension, tangents, columns, rows)
-    work = layout.unwritten()
-    _clear_work(work, layout, method)
-    return work
-
-
-def _clear_work(work: Any, layout: Any, method: Any) -> None:
-    """Let scratch memory know nothing of another run."""
-    layout.clear(work)
-    if method.implicit:
-        _forget_last_step(work)
-
-
-def _forget_last_step(work: Any) -> None:
-    """Let there be no last step whose polynomial could be a guess."""
-    work.systems[-1] = -1.0
+    return work_layout(method, dimension, tangents, columns, rows).zeros()
 
 
 class Memory:
@@ -71,6 +56,8 @@ class Memory:
         self.plan = plan
         self.run, self.work = plan.run_layout.unwritten(), plan.work_layout.unwritten()
         self._model: Any = None
+        # Of the last runs from many starts (``starts_of``).
+        self.starts: Any = None
         self._tasks: dict[tuple[bool, bool], Any] = {}
         self._driven = self._task(plan.model, orthonormal=False)
         # What every run writes first, found once: views of all words, of the state and of single numbers.
@@ -86,8 +73,6 @@ class Memory:
         plan, numbers = self.plan, self._numbers
         self._run_words[:] = self._fresh
         self._work_words.fill(0)
-        if plan.method.implicit:
-            _forget_last_step(self.work)
         cycle, phase = split_time(t0, model.period)
         self._counters[CYCLE], numbers[PHASE], numbers[HORIZON] = cycle, phase, horizon
         if plan.ticks is not None:
@@ -148,19 +133,22 @@ def starts_of(memory: Memory, origins: np.ndarray, queue: np.ndarray, **others: 
 
     ``queue (1,)`` is shared by all memories of these runs.
     """
-    plan = memory.plan
-    run_words, work_words = plan.run_layout.words(memory.run), plan.work_layout.words(memory.work)
-    return Starts(
-        counters=np.full(1, -1, dtype=np.int64),
-        origins=origins,
-        queue=queue,
-        verdicts=np.zeros(len(plan.model.target), dtype=np.int64),
-        run_words=run_words,
-        fresh_run=run_words.copy(),
-        work_words=work_words,
-        fresh_work=work_words.copy(),
-        **others,
-    )
+    plan, known = memory.plan, memory.starts
+    if known is None:
+        run_words = plan.run_layout.words(memory.run)
+        known = memory.starts = Starts(
+            counters=np.empty(1, dtype=np.int64),
+            origins=origins,
+            queue=queue,
+            verdicts=np.zeros(len(plan.model.target), dtype=np.int64),
+            run_words=run_words,
+            fresh_run=run_words.copy(),
+            work_words=plan.work_layout.words(memory.work),
+            **others,
+        )
+    known.now = -1
+    known.fresh_run[:] = known.run_words
+    return known.replace(origins=origins, queue=queue, **others)
 
 
 @lru_cache(MOST_LAYOUTS)

@@ -259,17 +259,12 @@ class _Runs:
         places = np.zeros((len(block), 3), dtype=np.int64)
         (t0, t1), count = self.t_span, min(len(block), TOGETHER)
         memories, phase0 = berths(plan, self.model, count, origins[0], t0, t1 - t0)
-        queue = np.zeros(1, dtype=np.int64)
-        jobs = [
-            Sampled(
-                counters=np.zeros(1, dtype=np.int64),
-                starts=starts_of(each, origins, queue, named=self.named, found=places),
-                cycles=self.cycles,
-                phases=self.phases,
-                states=states,
-            )
-            for each in memories
-        ]
+        queue, counters = np.zeros(1, dtype=np.int64), np.zeros((count, 1), dtype=np.int64)
+        starts = [starts_of(each, origins, queue, named=self.named, found=places) for each in memories]
+        common = Sampled(
+            counters=counters[0], starts=starts[0], cycles=self.cycles, phases=self.phases, states=states
+        )
+        jobs = [common.replace(counters=counters[i], starts=each) for i, each in enumerate(starts)]
         tasks = [each.task(self.model, orthonormal=False) for each in memories]
         crew = Crew(together(self.compiled, plan, 0), plan, tasks, jobs)
         most = self.options["solver"].max_steps

@@ -24,7 +24,7 @@ from hybrid.compiler.propagators.writing import (
 )
 from hybrid.compiler.statements.code import Code, Statement, at, call, get, less, put, several, when
 from hybrid.compiler.statements.values import assignments
-from hybrid.compiler.taylor.convolutions import InRegisters
+from hybrid.compiler.taylor.convolutions import InMemory, InRegisters
 from hybrid.compiler.taylor.loops import GROUPS, StateLoop, TangentLoop
 from hybrid.compiler.taylor.series import ONE_THEN_ZERO, ORDER, OUT, NoSeries, Recurrences, o
 from hybrid.expression.derivatives import derivative, directional, divergence
@@ -149,14 +149,7 @@ class AbreastSums(InRegisters):
     def __init__(self, block: Recurrences) -> None:
         self.block = block
 
-    def inner(self) -> list[Statement]:
-        """Give each convolution its name, with the term of a first factor that is a component."""
-        block, found = self.block, list[Statement]()
-        for i, (pair, total) in enumerate(zip(block.pairs, self._totals(), strict=True)):
-            if pair in block.led:
-                total = total + block.led[pair] * at("out", 0, block.beside(i))
-            found.append(put(block.inner(i), total))
-        return found
+    inner = InMemory.inner
 
     def keep(self) -> list[Statement]:
         """Keep the newest coefficients."""

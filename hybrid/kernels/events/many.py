@@ -26,13 +26,6 @@ sampled_at = structure_at(Sampled)
 
 
 @njit(**KERNEL)
-def set_words(words, fresh):
-    """Make a structure's memory what it was when the structure was new."""
-    for i in range(words.shape[0]):
-        words[i] = fresh[i]
-
-
-@njit(**KERNEL)
 def guards_beyond(named, verdicts):
     """Number of guards that a start in the mode ``named`` lies beyond: none where the mode was found."""
     count = 0
@@ -82,8 +75,10 @@ def begin_next(parts, task, starts):
         return NO_MODE
     starts.now = i
     starts.queue[0] = i + 1
-    set_words(starts.run_words, starts.fresh_run)
-    set_words(starts.work_words, starts.fresh_work)
+    for word in range(starts.run_words.shape[0]):
+        starts.run_words[word] = starts.fresh_run[word]
+    for word in range(starts.work_words.shape[0]):
+        starts.work_words[word] = 0
     for c in range(task.model.dimension):
         run.y[c] = starts.origins[i, c]
         run.scale[c] = abs(starts.origins[i, c])

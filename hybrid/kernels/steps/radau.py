@@ -49,7 +49,8 @@ def predict(method, mode, h, y, n, work):
     """
     s = method.b.shape[0]
     last = work.systems[(s + 1) * n + 1 :]
-    again = last[s + 2, LAST_MODE] == mode
+    # In memory that is new the length is zero.
+    again = last[s + 2, LAST_LENGTH] > 0.0 and last[s + 2, LAST_MODE] == mode
     onwards = again
     for i in range(n):
         again = again and y[i] == last[s, i]
@@ -78,8 +79,7 @@ def remember(method, mode, h, y, n, work):
             last[stage - 1, i] = work.stages[stage, i]
         last[s, i] = y[i]
         last[s + 1, i] = work.new[i]
-    last[s + 2, LAST_LENGTH] = h
-    last[s + 2, LAST_MODE] = mode if h > 0.0 else -1.0
+    last[s + 2, LAST_LENGTH], last[s + 2, LAST_MODE] = h, mode
 
 
 @njit(**KERNEL)
@@ -199,7 +199,7 @@ def attempt_radau(model, method, mode, t, h, y, tangents, work):
         return math.nan
     predict(method, mode, h, y, n, work)
     if not solve_stages(model, method, mode, t, h, y, work):
-        work.systems[work.systems.shape[0] - 1, LAST_MODE] = -1.0
+        work.systems[work.systems.shape[0] - 1, LAST_LENGTH] = 0.0
         # Whoever repeats a step up to an event does not ask for its error: what is left here is no step.
         for i in range(length):
             work.new[i] = math.nan

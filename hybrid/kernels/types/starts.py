@@ -9,10 +9,10 @@ class Starts(Structure, counters=("now",)):
     """The starts ``origins (N, n)`` of runs in one memory; several memories share the starts.
 
     The run under way is from the start ``now``, -1 for none; the next one is in ``queue (1,)``.
-    ``run_words`` and ``work_words`` are the memory of run and work, ``fresh_run`` and ``fresh_work`` what
-    that holds at the start. All runs start in the mode ``named``, or in the one that allows the start if that
-    is NO_MODE; ``verdicts`` are what each guard says of the last start. ``found (N, ...)`` are rows of what
-    is found.
+    ``run_words`` and ``work_words`` are the memory of run and work; at the start the first holds
+    ``fresh_run``, and the other zeros. All runs start in the mode ``named``, or in the one that allows the
+    start if that is NO_MODE; ``verdicts`` are what each guard says of the last start. ``found (N, ...)`` are
+    rows of what is found.
     """
 
     counters: INDICES
@@ -23,7 +23,6 @@ class Starts(Structure, counters=("now",)):
     run_words: INDICES
     fresh_run: INDICES
     work_words: INDICES
-    fresh_work: INDICES
     found: INDEX_MATRIX
 
 

@@ -160,12 +160,8 @@ class Layout:
     def zeros(self):
         """A structure whose arrays are zero."""
         structure = self.unwritten()
-        self.clear(structure)
-        return structure
-
-    def clear(self, structure):
-        """Make the arrays of a structure zero."""
         structure._memory[self._places_of(structure)] = 0
+        return structure
 
     def begin_as(self, structure):
         """Let ``renew`` give arrays what those of this structure hold now."""

@@ -75,16 +75,18 @@ class Runs:
             return
         plan, count = self.plan, min(len(origins), TOGETHER)
         memories, phase0 = berths(plan, self.model, count, origins[0], self.setup.t0)
-        section, queue = self.section(phase0, most), np.zeros(1, dtype=np.int64)
-        jobs = [
-            Settling(
-                starts=starts_of(each, origins, queue, named=self.named, found=found),
-                known=known,
-                section=section,
-                progress=self.progress(int(each.run.cycle), phase0),
-            )
-            for each in memories
+        queue = np.zeros(1, dtype=np.int64)
+        starts = [starts_of(each, origins, queue, named=self.named, found=found) for each in memories]
+        progress = self.progress(int(memories[0].run.cycle), phase0)
+        common = Settling(
+            starts=starts[0], known=known, section=self.section(phase0, most), progress=progress
+        )
+        # Each run has numbers of its own, which begin alike.
+        of_each = [
+            progress.replace(counters=progress.counters.copy(), numbers=progress.numbers.copy())
+            for _ in memories
         ]
+        jobs = [common.replace(starts=one, progress=own) for one, own in zip(starts, of_each, strict=True)]
         tasks = [each.task(self.model, orthonormal=False) for each in memories]
         crew = Crew(together(self.compiled, plan, 0), plan, tasks, jobs)
         crew.memory.max_steps[:] = self.setup.solver.max_steps
