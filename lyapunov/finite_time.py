@@ -3,23 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridSystem, arguments
+from hybrid.compiler.cache.loader import load_kernels
 from hybrid.errors import HybridError
 from hybrid.kernels.types import codes
 from hybrid.orbits.factors import fundamental_factors
 from hybrid.orbits.periodic_schur import product_eigenvalues
+from hybrid.simulation.crew import TOGETHER, Crew, together
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
 from hybrid.transform.aged import aged, least_dimension
+from lyapunov.interval import end_at, maps_of
 from lyapunov.spectrum import interval_length
 
+# By how much two sums of logarithms may differ that are the same but for the error of a run.
+SAME = 1e-9
 STARTS = "be a state (n,) or states of shape (N, n)"
+
+
+class Flight(NamedTuple):
+    """A run at its start, and the length of its intervals."""
+
+    trajectory: Trajectory
+    length: float
 
 
 @growing
@@ -85,21 +98,25 @@ def finite_time_exponents(
     if not one:
         _check(system, starts)
     found = np.full((1 if one else len(starts), count, least_dimension(system)), np.nan)
-    failures = []
-    for i, each in enumerate(starts[None] if one else starts):
-        try:
-            trajectory = start(
-                system,
-                each,
-                t0,
-                mode=mode,
-                parameters=parameters,
-                solver=solver,
-                tangent=np.eye(aged(system).tangent_dimension),
-            )
-            _fill(found[i], trajectory, interval_length(trajectory, interval, count))
-        except HybridError as failure:
-            failures.append(failure)
+    origins, failures = (starts[None] if one else starts), list[HybridError]()
+
+    def begin(i: int) -> Trajectory:
+        vectors = np.eye(aged(system).tangent_dimension)
+        return start(system, origins[i], t0, mode=mode, parameters=parameters, solver=solver, tangent=vectors)
+
+    for first in range(0, len(origins), TOGETHER):
+        flights = dict[int, Flight]()
+        for i in range(first, min(first + TOGETHER, len(origins))):
+            try:
+                trajectory = begin(i)
+                flights[i] = Flight(trajectory, interval_length(trajectory, interval, count))
+            except HybridError as failure:
+                failures.append(failure)
+        for i in _not_told(flights, found):
+            try:
+                _fill(found[i], begin(i), flights[i].length)
+            except HybridError as failure:
+                failures.append(failure)
     if failures and len(failures) == len(found):
         # Not one start is at fault, but another argument.
         raise failures[0]
@@ -114,6 +131,37 @@ def _check(system: HybridSystem, starts: np.ndarray) -> None:
     if bad.size:
         raise ArgumentError(f"x0 must be finite; got x0[{bad[0]}] = {starts[bad[0]].tolist()}.")
     system.variables.check_counts("x0", starts)
+
+
+def _not_told(flights: Mapping[int, Flight], out: np.ndarray) -> list[int]:
+    """Write the exponents of runs into their places in ``out``, but for those returned, which need factors.
+
+    The runs take their steps together. Their maps are single matrices, which tell the exponents if no digit
+    is lost in them. Then the logarithms of all singular values add up to what the sum rule says.
+    """
+    if not flights:
+        return []
+    trajectory = next(iter(flights.values())).trajectory
+    plan, n, k = trajectory.plan, trajectory.model.dimension, trajectory.tangents
+    if out.shape[2] < k:
+        return [*flights]
+    jobs = [maps_of(end_at(each.run), length, out.shape[1], n * k + 1) for each, length in flights.values()]
+    tasks = [each.task(each.no_record()) for each, _ in flights.values()]
+    crew = Crew(together(trajectory.compiled, plan, k), plan, tasks, jobs)
+    crew.memory.max_steps[:] = trajectory.max_steps
+    crew.memory.codes[:] = codes.GO_ON
+    crew.go(load_kernels("lyapunov.kernels").maps_of_run, trajectory.stop)
+    maps = np.stack([each.maps for each in jobs])
+    whole = np.isfinite(maps).all(axis=(1, 2))
+    vectors = np.where(whole[:, None, None], maps, 1.0)[:, :, :-1].reshape(*maps.shape[:2], k, n)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logarithms = np.log(np.linalg.svd(vectors[..., :k], compute_uv=False))
+        told = whole & (np.abs(logarithms.sum(axis=2) - maps[:, :, -1]) <= SAME).all(axis=1)
+    for i, is_told, each in zip(flights, told, logarithms, strict=True):
+        if is_told:
+            out[i] = each / flights[i].length
+        flights[i].trajectory.release()
+    return [i for i, is_told in zip(flights, told, strict=True) if not is_told]
 
 
 def _fill(out: np.ndarray, trajectory: Trajectory, length: float) -> None:

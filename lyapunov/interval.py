@@ -44,6 +44,19 @@ class Growth(Structure, counters=("done", "count")):
     rates: MATRIX
 
 
+class Maps(Structure, counters=("done", "count")):
+    """The intervals of a run among others whose tangent maps are wanted: so many are ``done`` of a ``count``.
+
+    A row of ``maps (M, k n + 1)`` has the images of ``k`` unit vectors, and the other side of the sum rule:
+    the integral of div f plus the log-determinants of the saltation matrices.
+    """
+
+    counters: INDICES
+    end: End
+    interval: REAL
+    maps: MATRIX
+
+
 END = Layout(End, {"counters": (2,), "numbers": (1,)})
 
 
@@ -63,6 +76,12 @@ def growth_of(end: Any, sums: Any, interval: float, intervals: int, columns: int
         interval=interval,
         rates=np.zeros((intervals, columns)),
     )
+
+
+def maps_of(end: Any, interval: float, intervals: int, columns: int) -> Any:
+    """The ``Maps`` of so many intervals."""
+    counters = np.array([0, intervals], dtype=np.int64)
+    return Maps(counters=counters, end=end, interval=interval, maps=np.full((intervals, columns), np.nan))
 
 
 @cache

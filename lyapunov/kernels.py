@@ -20,12 +20,12 @@ from hybrid.kernels.types.layout import ADVANCE, Parts, Task
 from hybrid.kernels.types.numba_door.addressed import structure_at
 from hybrid.kernels.types.options import KERNEL, exported
 from lyapunov import batches
-from lyapunov.interval import End, Growth, Sums
+from lyapunov.interval import End, Growth, Maps, Sums
 
 UNLIMITED = 9223372036854775807
 
 push = njit(**KERNEL)(batches.push)
-growth_at = structure_at(Growth)
+growth_at, maps_at = structure_at(Growth), structure_at(Maps)
 
 
 @njit(**KERNEL)
@@ -119,6 +119,30 @@ def growth_of_run(parts, task, crew, r, code):
     begin_interval(task, growth.end, growth.sums, growth.interval)
     crew.cycles[r], crew.phases[r] = growth.end.cycle, growth.end.phase
     crew.max_jumps[r] = run.jumps
+    return GO_ON
+
+
+@exported(INTEGER, Parts, Task, Crew, INTEGER, INTEGER)
+def maps_of_run(parts, task, crew, r, code):
+    """What a run does next whose tangent maps are wanted, each over an interval (``ONWARD``)."""
+    job, run, n = maps_at(crew.jobs[r]), task.run, task.model.dimension
+    entries = n * task.tangents
+    if code == DONE:
+        for i in range(entries):
+            job.maps[job.done, i] = run.y[n + i]
+        job.maps[job.done, entries] = run.divergence + run.log_determinant
+        job.done += 1
+        if job.done == job.count:
+            return DONE
+    elif code != GO_ON:
+        return code
+    for i in range(entries):
+        run.y[n + i] = 1.0 if i // n == i % n else 0.0
+    run.divergence, run.log_determinant, run.strain = 0.0, 0.0, 0.0
+    if run.stage == READY:
+        run.stage = STALE
+    job.end.cycle, job.end.phase = later(task.model.period, job.end.cycle, job.end.phase, job.interval)
+    crew.cycles[r], crew.phases[r] = job.end.cycle, job.end.phase
     return GO_ON
 
 

@@ -30,6 +30,40 @@ def test_singular_values_out_of_the_range_of_one_matrix():
     np.testing.assert_allclose(found, [3.0, -7.0], rtol=1e-9)
 
 
+def test_singular_values_that_one_matrix_of_floats_does_not_hold():
+    """Rates of 3 and -7 in directions between the axes: the ratio of the singular values is 1e43."""
+    c, s = np.cos(0.4), np.sin(0.4)
+
+    def field(t, x, p):
+        u, v = 3 * (c * x.a + s * x.b), -7 * (c * x.b - s * x.a)
+        return c * u - s * v, s * u + c * v
+
+    system = hybrid.HybridSystem(state=("a", "b"), modes=[hybrid.Mode("m", field)])
+    for interval in (0.1, 10.0):
+        found = lyapunov.finite_time_exponents(system, (0.0, 0.0), interval=interval)
+        np.testing.assert_allclose(found, [3.0, -7.0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("intervals", [None, 3])
+def test_a_start_among_others_is_what_it_is_alone(intervals):
+    system = models.vibroimpact()
+    starts = (
+        np.array((-0.00765806, -0.00411675, 0.05565196, -0.35621583)) * np.linspace(0.9, 1.1, 30)[:, None]
+    )
+    found = lyapunov.finite_time_exponents(system, starts, intervals=intervals, mode="free")
+    alone = [
+        lyapunov.finite_time_exponents(system, each, intervals=intervals, mode="free") for each in starts[::7]
+    ]
+    np.testing.assert_array_equal(found[::7], alone)
+    # The sum of the exponents follows from the damping alone, and from the log-determinants of the jumps.
+    sums = [
+        lyapunov.lyapunov_spectrum(system, each, k=4, intervals=1, transient=0, mode="free").exponents.sum()
+        for each in starts[::7]
+    ]
+    first = found[::7] if intervals is None else found[::7, 0]
+    np.testing.assert_allclose(first.sum(axis=1), sums, rtol=1e-8)
+
+
 def test_a_map_with_a_lost_direction():
     """After one reset that forgets y, (dx, dy) is (4 - 8 x, 1) dx."""
     system = clocked(("x", "y"), lambda t, x, p: (4 * x.x * (1 - x.x), x.x))
