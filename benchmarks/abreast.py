@@ -1,6 +1,6 @@
 """Runs that take their steps together beside single runs: ``python -m benchmarks.abreast``.
 
-Processor time, the least of turns that alternate in one process. A row is a run among 48.
+Processor time, the least of turns that alternate in one process. A row is a run among 480.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from lyapunov.directions import first_vectors
 from lyapunov.spectrum import Estimate
 from lyapunov.together import means_together
 
-ROWS = 48
+ROWS = 480
 # Starts, the mode of the start, and the time of a run.
 CASES: dict[str, tuple[Callable[[], Any], tuple[float, ...], str | None, float]] = {
     "vibro-impact, Hertz contact": (
