@@ -15,7 +15,7 @@ from hybrid.compiler.llvm.machine import machine_code
 from hybrid.compiler.statements.code import at
 from hybrid.compiler.statements.values import assignments
 from hybrid.expression.vocabulary import named
-from hybrid.kernels.arithmetic import columns, doubled, lanes, tables
+from tests.hybrid import in_python
 
 OF_MATH = (
     *("acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "copysign", "cos", "cosh", "exp", "expm1"),
@@ -44,18 +44,14 @@ OPERATIONS = {
     "max": max,
     "several": lambda *numbers: numbers,
     "item": lambda numbers, place: numbers[place],
-    "table": tables.table,
-    "divided_dot_product": doubled.divided_dot_product,
+    "table": in_python.table,
     **{name: getattr(np, name) for name in OF_MATH},
     **{f"np.{name}": getattr(np, name) for name in ("floor", "ceil", "trunc", "rint", "fmod")},
     **{name: named(name) for name in ("erf", "erfc")},
     **{
-        name: getattr(lanes, name)
-        for name in ("load", "store", "store_down", "store_row", "four", "four_times")
-    },
-    **{
-        name: getattr(columns, name)
+        name: getattr(in_python, name)
         for name in (
+            *("load", "store", "store_down", "store_row", "four", "four_times", "divided_dot_product"),
             *("convolve", "convolve_pairs", "convolved", "convolved_pairs", "add_ends", "add_ends_of_pairs"),
             *("combine", "combine_tangents", "spread_tangents"),
         )

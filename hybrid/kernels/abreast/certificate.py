@@ -20,14 +20,13 @@ from hybrid.kernels.abreast.rows import (
     bits_of,
     both,
     either,
-    fused,
     in_every_run,
     put_rows,
     rows_at,
-    smaller,
     where,
     without,
 )
+from hybrid.kernels.arithmetic.wide import fused, smaller
 from hybrid.kernels.types.abreast import DEGREE
 from hybrid.kernels.types.options import INLINE, KERNEL
 

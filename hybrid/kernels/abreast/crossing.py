@@ -4,22 +4,18 @@ from numba import njit
 
 from hybrid.kernels.abreast.certificate import certify
 from hybrid.kernels.abreast.rows import (
-    binary_logarithms_of,
     bits_of,
     both,
     either,
     entry_at,
-    fused,
     in_every_run,
-    larger,
-    magnitude,
-    powers_of_two,
     put_rows,
     rows_at,
-    square_root,
     where,
     without,
 )
+from hybrid.kernels.arithmetic.powers import binary_logarithms, powers_of_two
+from hybrid.kernels.arithmetic.wide import fused, larger, magnitude, square_root
 from hybrid.kernels.events.guards import ROUNDING_OF_STATE
 from hybrid.kernels.steps.series import holds_roots
 from hybrid.kernels.types.abreast import DEGREE, PER_GUARD, PERIOD, T
@@ -77,7 +73,7 @@ def band_of(model, method, sea, clock, mode, slot, order, size, h, exact):
         band = (
             square_root(band)
             if model.root[mode] == 2
-            else powers_of_two((binary_logarithms_of(band) + 0.1) / model.root[mode])
+            else powers_of_two((binary_logarithms(band) + 0.1) / model.root[mode])
         )
     band = fused(size, ROUNDING_OF_SUM, band)
     if model.degree[mode] == 0:

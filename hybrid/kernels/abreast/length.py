@@ -8,18 +8,14 @@ import math
 from numba import njit
 
 from hybrid.kernels.abreast.rows import (
-    binary_logarithms_of,
     both,
     entry_at,
-    fused,
     in_every_run,
-    larger,
-    magnitude,
-    powers_of_two,
     put_rows,
     rows_at,
-    square_root,
 )
+from hybrid.kernels.arithmetic.powers import binary_logarithms, powers_of_two
+from hybrid.kernels.arithmetic.wide import fused, larger, magnitude, square_root
 from hybrid.kernels.steps.series_length import (
     BEFORE_TAIL,
     EXACT_TOLERANCE,
@@ -95,7 +91,7 @@ def trusted_length(method, sea, n, tangents, start, stride, order, exact):
     newer, older = last, last
     for o in range(order, tail, -1):
         worst, lower, share = largest_of_state(sea, n, o), fall * (order - o), 1.0 / max(o, 1)
-        logarithm = binary_logarithms_of(worst)
+        logarithm = binary_logarithms(worst)
         own = larger((logarithm - lower) * share, own)
         if o > order - 4:
             newer = larger(logarithm, newer)
@@ -103,10 +99,10 @@ def trusted_length(method, sea, n, tangents, start, stride, order, exact):
             older = larger(logarithm, older)
         if tangents > 0:
             worst = largest_of_tangents(sea, n, tangents, start, stride, o, worst)
-            last = larger((binary_logarithms_of(worst) - lower) * share, last)
+            last = larger((binary_logarithms(worst) - lower) * share, last)
     last = larger(own, last)
     for o in range(tail, max(tail - BEFORE_TAIL, 0), -1):
-        logarithm = binary_logarithms_of(largest_of_state(sea, n, o))
+        logarithm = binary_logarithms(largest_of_state(sea, n, o))
         before = larger((logarithm - fall * (order - o)) * (1.0 / max(o, 1)), before)
     # Tangent vectors may shorten the step: that makes the series of the state no less regular.
     rise = before - own

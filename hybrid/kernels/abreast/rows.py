@@ -1,32 +1,22 @@
 """One number of each run that is abreast, in one register, as a type of the compiler.
 
-``Rows`` have arithmetic and comparisons with each other and with numbers. A comparison is a ``Mask``, one
-truth value of each run. No operation mixes the numbers of different runs, so what a run computes does not
-depend on the runs beside it.
+``Rows`` have the arithmetic of registers, and comparisons with each other and with numbers. A comparison is a
+``Mask``, one truth value of each run. No operation mixes the numbers of different runs, so what a run
+computes does not depend on the runs beside it.
 """
 
 import operator
-from typing import Any
 
 from llvmlite import ir
-from numba import njit, types
-from numba.extending import models, overload, register_model
+from numba import types
+from numba.extending import models, register_model
 
-from hybrid.kernels.arithmetic.lanes import HERE
-from hybrid.kernels.instructions.registers import FUSED, NUMBER, built_in, everywhere, read, vector_of, write
+from hybrid.kernels.arithmetic.wide import WideType, of_several, overload_operator
+from hybrid.kernels.instructions.registers import NUMBER, everywhere, read, write
 from hybrid.kernels.types.codes import ABREAST
 from hybrid.kernels.types.numba_door.building import intrinsic, unpack_tuple
-from hybrid.kernels.types.options import INLINE
 
-WHOLE = ir.VectorType(ir.IntType(64), ABREAST)
-BITS_OF_MANTISSA, BIAS = 52, 1023
-
-
-class RowsType(types.Type):
-    """The numba type of one number of each run."""
-
-    def __init__(self):
-        super().__init__("Rows")
+MASK_KIND = ir.VectorType(ir.IntType(1), ABREAST)
 
 
 class MaskType(types.Type):
@@ -36,19 +26,13 @@ class MaskType(types.Type):
         super().__init__("Mask")
 
 
-ROWS, MASK = RowsType(), MaskType()
-
-
-@register_model(RowsType)
-class _Rows(models.PrimitiveModel):
-    def __init__(self, manager, kind):
-        super().__init__(manager, kind, vector_of(ABREAST))
+ROWS, MASK = WideType(ABREAST), MaskType()
 
 
 @register_model(MaskType)
 class _Mask(models.PrimitiveModel):
     def __init__(self, manager, kind):
-        super().__init__(manager, kind, ir.VectorType(ir.IntType(1), ABREAST))
+        super().__init__(manager, kind, MASK_KIND)
 
 
 def _in_rows(builder, kinds, arguments):
@@ -167,9 +151,6 @@ def without(typing_context, a, b):
     return MASK(MASK, MASK), generate
 
 
-MASK_KIND = ir.VectorType(ir.IntType(1), ABREAST)
-
-
 @intrinsic
 def bits_of(typing_context, mask):
     """A mask as a number: bit ``i`` is the truth of run ``i``."""
@@ -190,147 +171,13 @@ def mask_of(typing_context, bits):
     return MASK(types.int64), generate
 
 
-def _of_two(result, write):
-    """The function of two operands, each one number of each run or one for all, that ``write`` writes."""
-
-    @intrinsic
-    def operate(typing_context, a, b):
-        kinds = [each if each == ROWS else types.float64 for each in (a, b)]
-
-        def generate(context, builder, signature, arguments):
-            return write(builder, *_in_rows(builder, kinds, arguments))
-
-        return result(*kinds), generate
-
-    return operate
-
-
-def _operation(instruction):
-    return _of_two(ROWS, lambda builder, a, b: getattr(builder, instruction)(a, b, flags=FUSED))
-
-
-def _comparison(symbol):
-    return _of_two(MASK, lambda builder, a, b: builder.fcmp_ordered(symbol, a, b))
-
-
-def _choice(symbol):
-    """The larger or the smaller number of each run; ``b`` where one is nan."""
-    return _of_two(ROWS, lambda builder, a, b: builder.select(builder.fcmp_ordered(symbol, a, b), a, b))
-
-
-larger, smaller = _choice(">"), _choice("<")
-
-
-def _function(name):
-    @intrinsic
-    def call(typing_context, rows):
-        def generate(context, builder, signature, arguments):
-            return built_in(builder, name, ABREAST, *arguments)
-
-        return ROWS(ROWS), generate
-
-    return call
-
-
-magnitude, square_root = _function("fabs"), _function("sqrt")
-
-
-@intrinsic
-def fused(typing_context, a, b, c):
-    """``a * b + c`` in each run."""
-    kinds = [each if each == ROWS else types.float64 for each in (a, b, c)]
-
-    def generate(context, builder, signature, arguments):
-        return built_in(builder, "fmuladd", ABREAST, *_in_rows(builder, kinds, arguments))
-
-    return ROWS(*kinds), generate
-
-
-@intrinsic
-def _exponent_and_mantissa(typing_context, rows):
-    """The exponents of positive numbers, and their mantissas minus 1."""
-
-    def generate(context, builder, signature, arguments):
-        bits = builder.bitcast(arguments[0], WHOLE)
-        exponent = builder.lshr(bits, WHOLE([BITS_OF_MANTISSA] * ABREAST))
-        # A small integer in the last bits of the float 2**52 adds its value to the float.
-        large = (BIAS + BITS_OF_MANTISSA) << BITS_OF_MANTISSA
-        exponent = builder.fsub(
-            builder.bitcast(builder.or_(exponent, WHOLE([large] * ABREAST)), vector_of(ABREAST)),
-            vector_of(ABREAST)([2.0**BITS_OF_MANTISSA + BIAS] * ABREAST),
-        )
-        mantissa = builder.and_(bits, WHOLE([(1 << BITS_OF_MANTISSA) - 1] * ABREAST))
-        mantissa = builder.or_(mantissa, WHOLE([BIAS << BITS_OF_MANTISSA] * ABREAST))
-        mantissa = builder.bitcast(mantissa, vector_of(ABREAST))
-        mantissa = builder.fsub(mantissa, vector_of(ABREAST)([1.0] * ABREAST))
-        return context.make_tuple(builder, signature.return_type, (exponent, mantissa))
-
-    return types.UniTuple(ROWS, 2)(ROWS), generate
-
-
-@intrinsic
-def _from_bits(typing_context, rows):
-    """The floats whose bits, as whole numbers, are these numbers."""
-
-    def generate(context, builder, signature, arguments):
-        return builder.bitcast(builder.fptosi(arguments[0], WHOLE), vector_of(ABREAST))
-
-    return ROWS(ROWS), generate
-
-
-_whole_part = _function("floor")
-
-
-@intrinsic
-def _negative(typing_context, rows):
-    def generate(context, builder, signature, arguments):
-        return builder.fneg(arguments[0])
-
-    return ROWS(ROWS), generate
-
-
-@overload(operator.neg, jit_options=HERE)
-def _overload_negative(rows):
-    return (lambda rows: _negative(rows)) if rows == ROWS else None
-
-
-def _overload(operation, function):
-    @overload(operation, jit_options=HERE)
-    def choose(a, b):
-        if ROWS in (a, b):
-            return lambda a, b: function(a, b)
-        return None
-
-
-_PAIRS: Any = (
-    (operator.add, _operation("fadd")),
-    (operator.sub, _operation("fsub")),
-    (operator.mul, _operation("fmul")),
-    (operator.truediv, _operation("fdiv")),
-    (operator.lt, _comparison("<")),
-    (operator.le, _comparison("<=")),
-    (operator.gt, _comparison(">")),
-    (operator.ge, _comparison(">=")),
-)
-for _operator, _intrinsic in _PAIRS:
-    _overload(_operator, _intrinsic)
-
-
-# ``log2(1 + m) = m + BULGE m (1 - m)``, within 0.008.
-BULGE = 0.346
-
-
-@njit(**INLINE)
-def binary_logarithms_of(rows):
-    """About ``log2`` of each number; -1023 for zero, 1024 or more for infinity and nan."""
-    exponent, mantissa = _exponent_and_mantissa(rows)
-    return exponent + mantissa + BULGE * (mantissa * (1.0 - mantissa))
-
-
-@njit(**INLINE)
-def powers_of_two(x):
-    """About ``2 ** x`` of each number; ``x`` is limited to -1000 to 1000."""
-    x = smaller(larger(x, -1000.0), 1000.0) + float(BIAS)
-    whole = _whole_part(x)
-    rest = x - whole
-    return _from_bits((whole + rest - BULGE * (rest * (1.0 - rest))) * 2.0**BITS_OF_MANTISSA)
+for _operator, _symbol in (
+    (operator.lt, "<"),
+    (operator.le, "<="),
+    (operator.gt, ">"),
+    (operator.ge, ">="),
+):
+    overload_operator(
+        _operator,
+        of_several(2, lambda builder, a, b, symbol=_symbol: builder.fcmp_ordered(symbol, a, b), result=MASK),
+    )

@@ -21,18 +21,15 @@ from hybrid.kernels.abreast.rows import (
     bits_of,
     both,
     entry_at,
-    fused,
     in_every_run,
-    larger,
-    magnitude,
     put_entry,
     put_rows,
     rows_at,
-    smaller,
     where,
     without,
 )
 from hybrid.kernels.arithmetic.clock import sum_in_two_parts
+from hybrid.kernels.arithmetic.wide import fused, larger, magnitude, smaller
 from hybrid.kernels.steps.series import FINEST, holds_roots, order_of
 from hybrid.kernels.types.abreast import (
     AHEAD_OF_STAY,

@@ -4,45 +4,16 @@ The rounding error of a product or a sum is itself a floating-point number (Dekk
 doi:10.1007/BF01397083; Ogita, Rump and Oishi 2005, doi:10.1137/030601818).
 """
 
-import numpy as np
-
 from hybrid.kernels.instructions.registers import built_in, everywhere, vector_of
 from hybrid.kernels.types.codes import NARROW
-from hybrid.kernels.types.layout import UPPER_HALF
-
-
-def divided_dot_product(factors, highs, lows, by):
-    """The sum of ``factors[i] (highs[i] + lows[i])``, divided by ``by``: rounded value and rounding error.
-
-    The factors and ``by`` are single numbers; all else is four numbers at once.
-    """
-    total, rest = np.zeros(NARROW), np.zeros(NARROW)
-    for factor, high, low in zip(factors, highs, lows, strict=True):
-        product = factor * high
-        longer = total + product
-        part = longer - total
-        rest += (total - (longer - part)) + (product - part)
-        rest += _lost(factor, high, product) + factor * low
-        total = longer
-    quotient = total / by
-    low = (rest - _lost(by, quotient, total)) / by
-    whole = quotient + low
-    return whole, low - (whole - quotient)
-
-
-def _lost(factor, lanes, product):
-    """Rounding error of ``product``, which is ``factor * lanes`` rounded."""
-    (a, b), (c, d) = _halves(factor), _halves(lanes)
-    return (a * c - product) + a * d + b * c + b * d
-
-
-def _halves(number):
-    upper = UPPER_HALF * number - (UPPER_HALF * number - number)
-    return upper, number - upper
 
 
 def write_divided_dot_product(builder, factors, highs, lows, by):
-    """The instructions of ``divided_dot_product``; returns both parts."""
+    """The instructions of ``divided_dot_product``: rounded value and rounding error of a sum that is divided.
+
+    The sum is that of ``factors[i] (highs[i] + lows[i])``, the divisor ``by``. The factors and ``by`` are
+    single numbers; all else is four numbers at once.
+    """
     zero = vector_of(NARROW)([0.0] * NARROW)
     add, subtract, divide = builder.fadd, builder.fsub, builder.fdiv
 

@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 from numba import njit
 
 from hybrid.kernels.types.codes import HEAD
@@ -15,14 +14,6 @@ SMALL = 1e-9
 ROUNDING = 8.0 * EPSILON
 # The first and the last piece end here.
 FAR = 1e300
-
-
-def table(p, first, knots, degree, order, u):
-    """The value of a table whose numbers begin at ``first``, or a derivative of its pieces."""
-    passed = np.searchsorted(p[first + HEAD : first + HEAD + knots], u, side="right")
-    away = u - p[first + HEAD + max(passed - 1, 0)]
-    row = first + HEAD + knots + passed * (degree + 1)
-    return sum(math.perm(k, order) * p[row + k] * away ** (k - order) for k in range(order, degree + 1))
 
 
 @njit(**KERNEL)

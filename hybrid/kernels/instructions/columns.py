@@ -24,7 +24,13 @@ def _registers(width, widest):
 
 
 def write_convolution(builder, rows, order, left, first, width, pairs=False):
-    """The instructions of ``convolve``, or of ``convolve_pairs``."""
+    """The instructions of ``convolve``: begin the convolutions of ``order``, which is odd, and of the next.
+
+    Sums of ``rows[k - j, left] * rows[j, c]`` go into ``rows[k, c]``, for both orders ``k`` and for ``width``
+    columns ``c`` from ``first`` on. They have all terms with ``j <= order - 2`` and with
+    ``2 <= k - j <= order - 2``: no row from ``order - 1`` on is read. ``width`` is a multiple of 4. Those of
+    ``convolve_pairs`` differ in that each column has a factor of its own: they begin at column ``left``.
+    """
     number = order.type
     targets = [rows.address(each, first) for each in (order, builder.add(order, number(1)))]
     for _, place, sums in _convolution(builder, rows, order, [(left, first, width)], False, pairs):
@@ -33,7 +39,11 @@ def write_convolution(builder, rows, order, left, first, width, pairs=False):
 
 
 def write_convolved(builder, rows, order, lefts, firsts, sizes, known, pairs=False):
-    """The instructions of ``convolved``, or of ``convolved_pairs``; returns the registers."""
+    """The instructions of ``convolved``: the sums of ``convolve`` as registers of four, ``order`` first.
+
+    There are several blocks of columns, each with its own factor. If the factors are ``known``, their rows
+    are complete: ``0 <= j <= order - 2`` for both orders.
+    """
     blocks = [*zip(lefts, firsts, sizes, strict=True)]
     of_order, of_next = [], []
     for *_, sums in _convolution(builder, rows, order, blocks, known, pairs):
@@ -106,7 +116,10 @@ def _sums_at_once(builder, rows, order, blocks, registers, known, pairs):
 
 
 def write_ends(builder, rows, order, distance, left, first, width, pairs=False):
-    """The instructions of ``add_ends``, or of ``add_ends_of_pairs``."""
+    """The instructions of ``add_ends``: add the two terms in which a factor has the order ``distance``.
+
+    If both factors have, the two terms are one.
+    """
     number = order.type
     near, far = number(distance), builder.sub(order, number(distance))
     differ = builder.icmp_signed(">", order, number(2 * distance))
@@ -134,7 +147,10 @@ def _weighted_sum(builder, factors, terms):
 
 
 def write_combination(builder, rows, order, table, width, numbers):
-    """The instructions of ``combine``."""
+    """The instructions of ``combine``: every order of the first columns as a combination of blocks.
+
+    The blocks begin at column ``table``. Each of the ``numbers`` is the weight of one block.
+    """
     number = order.type
     target, source = rows.walker(number(0), number(0)), rows.walker(number(0), table)
     with loop(builder, number(0), builder.add(order, number(1)), number(1)):
@@ -147,7 +163,10 @@ def write_combination(builder, rows, order, table, width, numbers):
 
 
 def write_combination_of_tangents(builder, rows, order, table, width, first, n):
-    """The instructions of ``combine_tangents``."""
+    """The instructions of ``combine_tangents``: orders 1 and up of four tangent vectors from order 0.
+
+    Their factors are the first ``n`` columns of ``n`` blocks of a table.
+    """
     number = order.type
     start = rows.address(number(0), first)
     vectors = [read(builder, rows.beside(start, NARROW * j), NARROW) for j in range(n)]
@@ -161,7 +180,11 @@ def write_combination_of_tangents(builder, rows, order, table, width, first, n):
 
 
 def write_spread(builder, y, length, n, rows, first, stride):
-    """The instructions of ``spread_tangents``; lanes without a vector are zero."""
+    """The instructions of ``spread_tangents``: copy tangent vectors from ``y`` into order 0 of their series.
+
+    A block holds four vectors, component by component; lanes without a vector are zero. The first block
+    begins at column ``first``, the next block ``stride`` columns further.
+    """
     number = first.type
     count = builder.sub(builder.sdiv(length, number(n)), number(1))
     groups = builder.sdiv(builder.add(count, number(NARROW - 1)), number(NARROW))

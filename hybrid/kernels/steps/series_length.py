@@ -8,16 +8,14 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.lanes import (
     four_times,
-    larger,
     largest,
     largest_of_each,
     load,
-    magnitude,
     places,
-    square_root,
     store,
 )
 from hybrid.kernels.arithmetic.powers import binary_logarithms, power_of_two
+from hybrid.kernels.arithmetic.wide import larger, magnitude, square_root
 from hybrid.kernels.instructions.registers import whole_registers
 from hybrid.kernels.types.codes import HIGHEST_ORDER, NARROW
 from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH

@@ -11,11 +11,11 @@ from hybrid.compiler.taylor.series import ORDER, OUT
 from hybrid.kernels.arithmetic.columns import (
     evaluate,
     evaluate_with_sizes,
-    gather_tangents,
 )
 from hybrid.kernels.instructions.registers import Vectors
 from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL
 from hybrid.kernels.types.numba_door.numba_types import signature_of
+from tests.hybrid import in_python
 from tests.hybrid.code import both
 
 NOTHING = np.zeros(1)
@@ -135,7 +135,7 @@ def test_a_convolution_in_parts(convolve, ends, pairs):
 @pytest.mark.parametrize("order", [1, 2, 3, 13, 28, 30])
 @pytest.mark.parametrize(
     ("plain_function", "compiled"),
-    [(evaluate, compiled_evaluate), (evaluate_with_sizes, compiled_evaluate_with_sizes)],
+    [(in_python.evaluate, compiled_evaluate), (in_python.evaluate_with_sizes, compiled_evaluate_with_sizes)],
 )
 def test_evaluate(order, width, plain_function, compiled):
     series, plain = pair(width + 3)
@@ -144,7 +144,7 @@ def test_evaluate(order, width, plain_function, compiled):
     np.testing.assert_allclose(series, plain, rtol=1e-13, atol=1e-14)
     powers, terms = 0.7 ** np.arange(order + 1), plain[: order + 1, 2 : 2 + width]
     np.testing.assert_allclose(series[order + 1, 2 : 2 + width], powers @ terms, rtol=1e-12, atol=1e-14)
-    if plain_function is evaluate_with_sizes:
+    if plain_function is in_python.evaluate_with_sizes:
         np.testing.assert_allclose(series[order + 2, 2 : 2 + width], powers @ abs(terms), rtol=1e-12)
 
 
@@ -186,7 +186,7 @@ def test_tangent_vectors_there_and_back(count):
         series, back = np.full((2, 60), 7.0), y.copy()
         run(0, 0.0, y, NOTHING, 1, series)
         back[3:] = 0.0
-        gather_tangents(series, 0, 3, 8, 20, back)
+        in_python.gather_tangents(series, 0, 3, 8, 20, back)
         np.testing.assert_array_equal(back, y)
         assert count == 0 or series[0, 8 + 4] == y[4]
         assert not count % 4 or np.all(series[0, 8 + (count // 4) * 20 :][count % 4 : 12 : 4] == 0.0)
