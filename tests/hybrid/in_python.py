@@ -7,7 +7,8 @@ import math
 
 import numpy as np
 
-from hybrid.kernels.instructions.registers import whole_registers, widths
+from hybrid.compiler.llvm.registers import widths
+from hybrid.kernels.instructions.registers import whole_registers
 from hybrid.kernels.types.codes import HEAD, NARROW
 from hybrid.kernels.types.layout import UPPER_HALF
 

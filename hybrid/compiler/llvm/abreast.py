@@ -8,12 +8,13 @@ from typing import Any, ClassVar
 from llvmlite import ir
 
 from hybrid.compiler.llvm.calls import CALLS, NUMBER, WHOLE
+from hybrid.compiler.llvm.columns import write_convolved
 from hybrid.compiler.llvm.lowering import TRUTH, Body, Signature
+from hybrid.compiler.llvm.registers import joined
 from hybrid.compiler.llvm.waves import sine
 from hybrid.compiler.statements.code import LoweringError
-from hybrid.kernels.instructions.columns import write_convolved
 from hybrid.kernels.instructions.loops import declared
-from hybrid.kernels.instructions.registers import Matrix, everywhere, joined, vector_of
+from hybrid.kernels.instructions.registers import Matrix, everywhere, vector_of
 from hybrid.kernels.types.codes import ABREAST, NARROW
 
 ROW = vector_of(ABREAST)

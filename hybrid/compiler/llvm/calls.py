@@ -10,8 +10,7 @@ from typing import Any
 import attrs
 from llvmlite import ir
 
-from hybrid.kernels.arithmetic.doubled import write_divided_dot_product
-from hybrid.kernels.instructions.columns import (
+from hybrid.compiler.llvm.columns import (
     write_combination,
     write_combination_of_tangents,
     write_convolution,
@@ -19,8 +18,10 @@ from hybrid.kernels.instructions.columns import (
     write_ends,
     write_spread,
 )
+from hybrid.compiler.llvm.doubled import write_divided_dot_product
+from hybrid.compiler.llvm.registers import four, write_down, write_row
 from hybrid.kernels.instructions.loops import declared
-from hybrid.kernels.instructions.registers import everywhere, four, read, write, write_down, write_row
+from hybrid.kernels.instructions.registers import everywhere, read, write
 from hybrid.kernels.types.codes import HEAD, NARROW
 
 NUMBER = ir.DoubleType()

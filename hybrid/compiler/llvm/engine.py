@@ -11,7 +11,7 @@ import attrs
 from llvmlite import binding
 
 from hybrid.compiler.interrupts import between_passes
-from hybrid.kernels.instructions.registers import Vectors
+from hybrid.compiler.llvm.registers import Vectors
 from hybrid.kernels.types.codes import NARROW, WIDE
 
 # LLVM's highest level of optimisation, and the lowest one that keeps numbers in registers.

@@ -5,6 +5,7 @@ import pytest
 from numba import njit
 
 from hybrid.compiler.llvm import lowering
+from hybrid.compiler.llvm.registers import Vectors
 from hybrid.compiler.statements.code import call, do, get, put, several
 from hybrid.compiler.taylor.loops import VECTORS
 from hybrid.compiler.taylor.series import ORDER, OUT
@@ -12,7 +13,6 @@ from hybrid.kernels.arithmetic.columns import (
     evaluate,
     evaluate_with_sizes,
 )
-from hybrid.kernels.instructions.registers import Vectors
 from hybrid.kernels.types.kinds import INTEGER, MATRIX, REAL
 from hybrid.kernels.types.numba_door.numba_types import signature_of
 from tests.hybrid import in_python

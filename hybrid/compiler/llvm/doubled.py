@@ -4,11 +4,15 @@ The rounding error of a product or a sum is itself a floating-point number (Dekk
 doi:10.1007/BF01397083; Ogita, Rump and Oishi 2005, doi:10.1137/030601818).
 """
 
+from __future__ import annotations
+
+from typing import Any
+
 from hybrid.kernels.instructions.registers import built_in, everywhere, vector_of
 from hybrid.kernels.types.codes import NARROW
 
 
-def write_divided_dot_product(builder, factors, highs, lows, by):
+def write_divided_dot_product(builder: Any, factors: Any, highs: Any, lows: Any, by: Any) -> Any:
     """The instructions of ``divided_dot_product``: rounded value and rounding error of a sum that is divided.
 
     The sum is that of ``factors[i] (highs[i] + lows[i])``, the divisor ``by``. The factors and ``by`` are
@@ -17,7 +21,7 @@ def write_divided_dot_product(builder, factors, highs, lows, by):
     zero = vector_of(NARROW)([0.0] * NARROW)
     add, subtract, divide = builder.fadd, builder.fsub, builder.fdiv
 
-    def lost(factor, lanes, product):
+    def lost(factor: Any, lanes: Any, product: Any) -> Any:
         negative = subtract(vector_of(NARROW)([-0.0] * NARROW), product)
         return built_in(builder, "fma", NARROW, factor, lanes, negative)
 

@@ -1,29 +1,28 @@
 """LLVM's instructions for series side by side in vector registers (``hybrid.kernels.arithmetic.columns``)."""
 
+from __future__ import annotations
+
+from typing import Any
+
+from hybrid.compiler.llvm.registers import parted
 from hybrid.kernels.instructions.loops import loop, variable
-from hybrid.kernels.instructions.registers import (
-    NUMBER,
-    everywhere,
-    multiply_add,
-    parted,
-    read,
-    vector_of,
-    write,
-)
+from hybrid.kernels.instructions.registers import NUMBER, everywhere, multiply_add, read, vector_of, write
 from hybrid.kernels.types.codes import NARROW, WIDE
 
 # In one sum, each term waits for the previous term: so there are two partial sums, of even and odd rows.
 PARTS = 2
 
 
-def _registers(width, widest):
+def _registers(width: Any, widest: Any) -> Any:
     """First column and width of each register, the widest registers first."""
     whole = width // widest * widest
     wide = [(place, widest) for place in range(0, whole, widest)]
     return wide + [(place, NARROW) for place in range(whole, width, NARROW)]
 
 
-def write_convolution(builder, rows, order, left, first, width, pairs=False):
+def write_convolution(
+    builder: Any, rows: Any, order: Any, left: Any, first: Any, width: Any, pairs: bool = False
+) -> Any:
     """The instructions of ``convolve``: begin the convolutions of ``order``, which is odd, and of the next.
 
     Sums of ``rows[k - j, left] * rows[j, c]`` go into ``rows[k, c]``, for both orders ``k`` and for ``width``
@@ -38,7 +37,9 @@ def write_convolution(builder, rows, order, left, first, width, pairs=False):
             write(builder, total, rows.beside(target, place))
 
 
-def write_convolved(builder, rows, order, lefts, firsts, sizes, known, pairs=False):
+def write_convolved(
+    builder: Any, rows: Any, order: Any, lefts: Any, firsts: Any, sizes: Any, known: Any, pairs: bool = False
+) -> Any:
     """The instructions of ``convolved``: the sums of ``convolve`` as registers of four, ``order`` first.
 
     There are several blocks of columns, each with its own factor. If the factors are ``known``, their rows
@@ -52,7 +53,7 @@ def write_convolved(builder, rows, order, lefts, firsts, sizes, known, pairs=Fal
     return of_order + of_next
 
 
-def _convolution(builder, rows, order, blocks, known, pairs):
+def _convolution(builder: Any, rows: Any, order: Any, blocks: Any, known: Any, pairs: Any) -> Any:
     """The instructions for the sums of convolutions of two orders.
 
     Yields, for each register, the number of its block, its first column there, and the two sums.
@@ -73,7 +74,9 @@ def _convolution(builder, rows, order, blocks, known, pairs):
         waiting = waiting[count:]
 
 
-def _sums_at_once(builder, rows, order, blocks, registers, known, pairs):
+def _sums_at_once(
+    builder: Any, rows: Any, order: Any, blocks: Any, registers: Any, known: Any, pairs: Any
+) -> Any:
     """One loop over the rows: each row is read once for both orders, since reading takes most of the time."""
     number = order.type
     begin, one = number(0 if known else 2), number(1)
@@ -82,7 +85,7 @@ def _sums_at_once(builder, rows, order, blocks, registers, known, pairs):
     keys = [(blocks[i][0], place if pairs else 0, width) for i, place, width in registers]
     factors = {left: rows.walker(builder.sub(order, begin), left) for left, _, _ in keys}
 
-    def factors_at(addresses):
+    def factors_at(addresses: Any) -> Any:
         if pairs:
             return {
                 (left, place, width): read(builder, rows.beside(addresses[left], place), width)
@@ -115,7 +118,9 @@ def _sums_at_once(builder, rows, order, blocks, registers, known, pairs):
         yield i, place, [builder.fadd(*each) for each in parts]
 
 
-def write_ends(builder, rows, order, distance, left, first, width, pairs=False):
+def write_ends(
+    builder: Any, rows: Any, order: Any, distance: Any, left: Any, first: Any, width: Any, pairs: bool = False
+) -> Any:
     """The instructions of ``add_ends``: add the two terms in which a factor has the order ``distance``.
 
     If both factors have, the two terms are one.
@@ -139,14 +144,14 @@ def write_ends(builder, rows, order, distance, left, first, width, pairs=False):
         write(builder, total, rows.beside(here, place))
 
 
-def _weighted_sum(builder, factors, terms):
+def _weighted_sum(builder: Any, factors: Any, terms: Any) -> Any:
     total = builder.fmul(factors[0], terms[0])
     for factor, term in zip(factors[1:], terms[1:], strict=True):
         total = multiply_add(builder, factor, term, total)
     return total
 
 
-def write_combination(builder, rows, order, table, width, numbers):
+def write_combination(builder: Any, rows: Any, order: Any, table: Any, width: Any, numbers: Any) -> Any:
     """The instructions of ``combine``: every order of the first columns as a combination of blocks.
 
     The blocks begin at column ``table``. Each of the ``numbers`` is the weight of one block.
@@ -162,7 +167,9 @@ def write_combination(builder, rows, order, table, width, numbers):
             write(builder, _weighted_sum(builder, factors, terms), rows.beside(here, place))
 
 
-def write_combination_of_tangents(builder, rows, order, table, width, first, n):
+def write_combination_of_tangents(
+    builder: Any, rows: Any, order: Any, table: Any, width: Any, first: Any, n: Any
+) -> Any:
     """The instructions of ``combine_tangents``: orders 1 and up of four tangent vectors from order 0.
 
     Their factors are the first ``n`` columns of ``n`` blocks of a table.
@@ -179,7 +186,7 @@ def write_combination_of_tangents(builder, rows, order, table, width, first, n):
             write(builder, _weighted_sum(builder, factors, vectors), rows.beside(here, NARROW * i))
 
 
-def write_spread(builder, y, length, n, rows, first, stride):
+def write_spread(builder: Any, y: Any, length: Any, n: Any, rows: Any, first: Any, stride: Any) -> Any:
     """The instructions of ``spread_tangents``: copy tangent vectors from ``y`` into order 0 of their series.
 
     A block holds four vectors, component by component; lanes without a vector are zero. The first block
