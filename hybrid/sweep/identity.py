@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from hashlib import blake2b
+from itertools import chain
 from pathlib import Path
 from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any
@@ -23,6 +24,8 @@ from hybrid.system.graph import HybridSystem
 
 # Hexadecimal digits of a hash in facts and attributes.
 DIGITS = 16
+# Of so many functions and files what is found is kept.
+KEPT = 1024
 # The functions of models are named in a model, so their code counts; that of the library does not.
 PACKAGES = tuple(Path(__file__).parents[2] / name for name in ("hybrid", "lyapunov"))
 STANDARD = Path(json.__file__).parents[1]
@@ -139,17 +142,21 @@ def _imported_inside(code: CodeType) -> dict[str, str]:
     The file counts as a whole, because the module may be imported only when the function runs.
     """
     found = {}
-    for step in dis.get_instructions(code):
-        if step.opname == "IMPORT_NAME" and isinstance(step.argval, str):
-            with suppress(ImportError, ValueError, AttributeError, OSError):
-                spec = importlib.util.find_spec(step.argval)
-                if spec is not None and spec.has_location and not _is_installed(str(spec.origin)):
-                    text = Path(str(spec.origin)).read_bytes()
-                    found[f"module {step.argval!r}"] = blake2b(text).hexdigest()[:DIGITS]
-    for inner in code.co_consts:
-        if isinstance(inner, CodeType):
-            found |= _imported_inside(inner)
+    for name in _imports_of(code):
+        with suppress(ImportError, ValueError, AttributeError, OSError):
+            spec = importlib.util.find_spec(name)
+            if spec is not None and spec.has_location and not _is_installed(str(spec.origin)):
+                text = Path(str(spec.origin)).read_bytes()
+                found[f"module {name!r}"] = blake2b(text).hexdigest()[:DIGITS]
     return found
+
+
+@functools.lru_cache(KEPT)
+def _imports_of(code: CodeType) -> tuple[str, ...]:
+    """Names of the modules that a function imports in its body, with those of its inner functions."""
+    steps = (each for each in dis.get_instructions(code) if each.opname == "IMPORT_NAME")
+    inner = (_imports_of(each) for each in code.co_consts if isinstance(each, CodeType))
+    return (*(each.argval for each in steps if isinstance(each.argval, str)), *chain.from_iterable(inner))
 
 
 def _own_code(task: Any) -> str:
@@ -264,6 +271,7 @@ def _is_installed_module(module: ModuleType | None) -> bool:
     return all(_is_installed(place) for place in places if place)
 
 
+@functools.lru_cache(KEPT)
 def _is_installed(filename: str) -> bool:
     """Whether code belongs to an installed package or to this library, whose versions stand for it."""
     path = Path(filename)
