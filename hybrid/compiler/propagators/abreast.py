@@ -25,7 +25,7 @@ from hybrid.compiler.propagators.writing import (
 from hybrid.compiler.statements.code import Code, Statement, at, call, get, less, put, several, when
 from hybrid.compiler.statements.values import assignments
 from hybrid.compiler.taylor.convolutions import InMemory, InRegisters
-from hybrid.compiler.taylor.loops import GROUPS, StateLoop, TangentLoop
+from hybrid.compiler.taylor.loops import StateLoop, TangentLoop
 from hybrid.compiler.taylor.series import ONE_THEN_ZERO, ORDER, OUT, NoSeries, Recurrences, o
 from hybrid.expression.derivatives import derivative, directional, divergence
 from hybrid.expression.graph import all_replaced, degree_of, is_negative, is_whole, replaced
@@ -199,6 +199,10 @@ class AbreastLoop(StateLoop):
         self.others: dict[int, Any] = {}
         self.factors: dict[int, int] = {}
 
+    def write_front(self, width: int, others: dict[int, Any]) -> None:
+        """Keep ``others``: each column is written by itself."""
+        self.others = others
+
     @cached_property
     def sums(self) -> AbreastSums:
         """How the convolutions are summed."""
@@ -247,29 +251,12 @@ class AbreastBody(Body):
 
     register = 1
     recurrences = AbreastRecurrences
+    state_loop = AbreastLoop
     tangent_loop = AbreastTangents
 
     def __init__(self, watched: Sequence[Expression], symbols: Symbols, *others: Any) -> None:
         self.watched = watched
         super().__init__(symbols, *others)
-
-    def _groups(self) -> Statement:
-        return put(GROUPS, call("length", "x") // self.n - 1)
-
-    def _state(
-        self,
-        prefix: str,
-        names: Sequence[Symbol | None],
-        columns: list[int],
-        starts: list[Any],
-        rates: Sequence[Expression],
-        guards: Sequence[Expression],
-    ) -> AbreastLoop:
-        block = self._block(prefix)
-        block.expect(names, rates)
-        moved = AbreastLoop(names, columns, rates, starts, block)
-        moved.others = {self.n + place: block.coefficient(guard) for place, guard in enumerate(guards)}
-        return moved
 
     def _place_pairs(self, moved: Any) -> dict[str, int]:
         """The column of the second factor of each convolution, by name; it has a new one if it has none."""

@@ -101,6 +101,7 @@ class Body:
     # Columns fill whole registers of so many numbers.
     register = WIDE
     recurrences = Recurrences
+    state_loop: Any = StateLoop
     tangent_loop: Any = TangentLoop
 
     def __init__(
@@ -191,23 +192,22 @@ class Body:
         shared = [*self.preamble, *self.constants.statements(), *self._sizes(), put(o, 0)]
         return Series(
             (*named(places), *shared, *alone.first(), each_order(alone.higher())),
-            (*named(placed), self._groups(), *shared, *self._orders(moved, carried)),
+            (
+                *named(placed),
+                groups(self.n, self.tangent_loop.width),
+                *shared,
+                *moved.first(),
+                each_order(moved.higher()),
+                *carried.statements(),
+            ),
             padded(max(width, self.columns), self.register),
             0,
             carried.columns,
         )
 
-    def _groups(self) -> Statement:
-        """The statement that computes the number of groups of tangent vectors."""
-        return groups(self.n)
-
     def _sizes(self) -> list[Statement]:
         """Statements for what errors of the guards are judged by, besides the terms of their series."""
         return []
-
-    def _orders(self, moved: Any, carried: Any) -> list[Statement]:
-        """Statements for all orders of the state and of the tangent vectors."""
-        return [*moved.first(), each_order(moved.higher()), *carried.statements()]
 
     def _state(
         self,
@@ -217,11 +217,11 @@ class Body:
         starts: list[Any],
         rates: Sequence[Expression],
         guards: Sequence[Expression],
-    ) -> StateLoop:
+    ) -> Any:
         """The loop of the state and of all other quantities in ``rates``; local names have a prefix."""
         block = self._block(prefix)
         block.expect(names, rates)
-        moved = StateLoop(names, columns, rates, starts, block)
+        moved = self.state_loop(names, columns, rates, starts, block)
         crossing = {self.n + place: block.coefficient(guard) for place, guard in enumerate(guards)}
         moved.write_front(self.behind_guards + OTHERS, crossing)
         return moved
@@ -254,9 +254,9 @@ def power_of(root: Code, order: int) -> Any:
     return reduce(mul, [root] * order)
 
 
-def groups(n: int) -> Statement:
-    """The statement that computes the number of groups of tangent vectors."""
-    return put(GROUPS, (call("length", "x") // n + (NARROW - 2)) // NARROW)
+def groups(n: int, width: int = NARROW) -> Statement:
+    """The statement that computes the number of groups of ``width`` tangent vectors."""
+    return put(GROUPS, (call("length", "x") // n + (width - 2)) // width)
 
 
 def named(places: Mapping[str, int]) -> list[Statement]:
