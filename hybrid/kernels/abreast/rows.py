@@ -11,8 +11,14 @@ from llvmlite import ir
 from numba import types
 from numba.extending import models, register_model
 
-from hybrid.kernels.arithmetic.wide import WideType, of_several, overload_operator
-from hybrid.kernels.instructions.registers import NUMBER, everywhere, read, write
+from hybrid.kernels.arithmetic.wide import (
+    WideType,
+    in_every_place,
+    in_registers,
+    of_several,
+    overload_operator,
+)
+from hybrid.kernels.instructions.registers import NUMBER, read, write
 from hybrid.kernels.types.codes import ABREAST
 from hybrid.kernels.types.numba_door.building import intrinsic, unpack_tuple
 
@@ -27,20 +33,13 @@ class MaskType(types.Type):
 
 
 ROWS, MASK = WideType(ABREAST), MaskType()
+in_every_run = in_every_place(ROWS)
 
 
 @register_model(MaskType)
 class _Mask(models.PrimitiveModel):
     def __init__(self, manager, kind):
         super().__init__(manager, kind, MASK_KIND)
-
-
-def _in_rows(builder, kinds, arguments):
-    """The arguments as registers: a number stands for itself in every run."""
-    return [
-        argument if kind == ROWS else everywhere(builder, argument, ABREAST)
-        for kind, argument in zip(kinds, arguments, strict=True)
-    ]
 
 
 def _address(context, builder, kind, array, indices):
@@ -81,7 +80,7 @@ def put_rows(typing_context, array, place, rows):
 
     def generate(context, builder, signature, arguments):
         address = _address(context, builder, array, arguments[0], arguments[1:2])
-        write(builder, _in_rows(builder, [rows], arguments[2:])[0], address)
+        write(builder, in_registers(builder, ABREAST, [rows], arguments[2:])[0], address)
         return context.get_dummy_value()
 
     return types.void(array, types.intp, rows if rows == ROWS else types.float64), generate
@@ -93,20 +92,10 @@ def put_entry(typing_context, array, row, column, rows):
 
     def generate(context, builder, signature, arguments):
         address = _address(context, builder, array, arguments[0], arguments[1:3])
-        write(builder, _in_rows(builder, [rows], arguments[3:])[0], address)
+        write(builder, in_registers(builder, ABREAST, [rows], arguments[3:])[0], address)
         return context.get_dummy_value()
 
     return types.void(array, types.intp, types.intp, rows if rows == ROWS else types.float64), generate
-
-
-@intrinsic
-def in_every_run(typing_context, number):
-    """One number in every run."""
-
-    def generate(context, builder, signature, arguments):
-        return everywhere(builder, arguments[0], ABREAST)
-
-    return ROWS(types.float64), generate
 
 
 @intrinsic
@@ -115,7 +104,7 @@ def where(typing_context, mask, a, b):
     kinds = [each if each == ROWS else types.float64 for each in (a, b)]
 
     def generate(context, builder, signature, arguments):
-        return builder.select(arguments[0], *_in_rows(builder, kinds, arguments[1:]))
+        return builder.select(arguments[0], *in_registers(builder, ABREAST, kinds, arguments[1:]))
 
     return ROWS(MASK, *kinds), generate
 

@@ -4,10 +4,9 @@ from llvmlite import ir
 from numba import types
 from numba.extending import register_jitable
 
-from hybrid.kernels.arithmetic.wide import WideType, larger_of
+from hybrid.kernels.arithmetic.wide import WideType, in_every_place, in_registers, larger_of
 from hybrid.kernels.instructions.registers import (
     Matrix,
-    everywhere,
     read,
     vector_of,
     whole_registers,
@@ -17,6 +16,7 @@ from hybrid.kernels.types.codes import NARROW
 from hybrid.kernels.types.numba_door.building import intrinsic, unpack_tuple
 
 LANES = WideType(NARROW)
+four_times = in_every_place(LANES)
 
 register_jitable(whole_registers)
 
@@ -45,21 +45,11 @@ def store(typing_context, matrix, row, column, lanes):
 
     def generate(context, builder, signature, arguments):
         array, row, column, value = arguments
-        vector = value if kind == LANES else everywhere(builder, value, NARROW)
+        [vector] = in_registers(builder, NARROW, [kind], [value])
         write(builder, vector, matrix_of(context, builder, matrix, array).address(row, column))
         return context.get_dummy_value()
 
     return types.void(matrix, types.intp, types.intp, kind), generate
-
-
-@intrinsic
-def four_times(typing_context, number):
-    """The same number in every lane."""
-
-    def generate(context, builder, signature, arguments):
-        return everywhere(builder, arguments[0], NARROW)
-
-    return LANES(types.float64), generate
 
 
 @intrinsic

@@ -45,6 +45,26 @@ def whole_numbers(width):
     return ir.VectorType(ir.IntType(64), width)
 
 
+def in_registers(builder, width, kinds, arguments):
+    """Arguments as registers: a number stands for itself in every place."""
+    return [
+        argument if isinstance(kind, WideType) else everywhere(builder, argument, width)
+        for kind, argument in zip(kinds, arguments, strict=True)
+    ]
+
+
+def in_every_place(kind):
+    """The function that gives one number in every place of a register of a type."""
+
+    def typed(typing_context, number):
+        def generate(context, builder, signature, arguments):
+            return everywhere(builder, arguments[0], kind.width)
+
+        return kind(types.float64), generate
+
+    return intrinsic(typed)
+
+
 def of_several(count, write, result=None):
     """The function of so many operands that ``write`` writes; its result is a register if nothing else."""
 
@@ -53,11 +73,7 @@ def of_several(count, write, result=None):
         kinds = [each if isinstance(each, WideType) else types.float64 for each in kinds]
 
         def generate(context, builder, signature, arguments):
-            registers = [
-                argument if isinstance(each, WideType) else everywhere(builder, argument, kind.width)
-                for each, argument in zip(kinds, arguments, strict=True)
-            ]
-            return write(builder, *registers)
+            return write(builder, *in_registers(builder, kind.width, kinds, arguments))
 
         return (result or kind)(*kinds), generate
 
