@@ -112,7 +112,10 @@ def finite_time_exponents(
                 flights[i] = Flight(trajectory, interval_length(trajectory, interval, count))
             except HybridError as failure:
                 failures.append(failure)
-        for i in _not_told(flights, found):
+        not_told = _not_told(flights, found)
+        for flight in flights.values():
+            flight.trajectory.release()
+        for i in not_told:
             try:
                 _fill(found[i], begin(i), flights[i].length)
             except HybridError as failure:
@@ -160,7 +163,6 @@ def _not_told(flights: Mapping[int, Flight], out: np.ndarray) -> list[int]:
     for i, is_told, each in zip(flights, told, logarithms, strict=True):
         if is_told:
             out[i] = each / flights[i].length
-        flights[i].trajectory.release()
     return [i for i, is_told in zip(flights, told, strict=True) if not is_told]
 
 
