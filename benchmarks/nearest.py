@@ -203,7 +203,7 @@ NEAREST = {
         "solvers/test_taylor.py",
         "solvers/test_gaps.py",
     ),
-    "hybrid/kernels/steps/runge_kutta_guards.py": (
+    "hybrid/kernels/steps/runge_kutta_landing.py": (
         "kernels/events/test_proved_crossings.py",
         "kernels/events/test_onset.py",
         "kernels/events/test_forms.py",
@@ -221,14 +221,14 @@ NEAREST = {
         "compiler/bounds/test_forcing.py",
         "compiler/bounds/test_pulses_in_state.py",
     ),
-    "hybrid/kernels/steps/series_guards.py": (
+    "hybrid/kernels/guards/first_event.py": (
         "kernels/events/test_onset.py",
         "simulation/test_simulate.py",
         "kernels/events/test_crossings.py",
         "kernels/events/test_grazing.py",
         "kernels/events/test_proved_crossings.py",
     ),
-    "hybrid/kernels/steps/series_roots.py": (
+    "hybrid/kernels/guards/roots.py": (
         "kernels/events/test_crossings.py",
         "simulation/test_infinite_slopes.py",
     ),

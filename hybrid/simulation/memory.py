@@ -44,9 +44,9 @@ def memory_for_records() -> float:
     return min(sizes, default=math.inf) / 3
 
 
-def workspace(method: Any, dimension: int, tangents: int, columns: int, rows: int = 0) -> Any:
-    """Scratch memory for one run; ``columns`` are those of series, ``rows`` those of the guards' programs."""
-    return work_layout(method, dimension, tangents, columns, rows).zeros()
+def workspace(method: Any, dimension: int) -> Any:
+    """Scratch memory for single jumps, without steps."""
+    return work_layout(method, dimension, 0, 0, 0, 0).zeros()
 
 
 class Memory:
@@ -152,17 +152,22 @@ def starts_of(memory: Memory, origins: np.ndarray, queue: np.ndarray, **others: 
 
 
 @lru_cache(MOST_LAYOUTS)
-def work_layout(method: Any, dimension: int, tangents: int, columns: int, rows: int) -> Any:
-    """Where the arrays of a workspace lie."""
+def work_layout(
+    method: Any, dimension: int, tangents: int, guards: int, columns: int, rows: int
+) -> Any:
+    """Where the arrays of a workspace lie.
+
+    A mode has at most so many ``guards``; ``columns`` are those of series, ``rows`` those of programs.
+    """
     n, length = dimension, dimension * (1 + tangents)
     stages, degree = len(method.a), len(method.interpolant) - 1
     coupled = len(method.b) if method.implicit else 0
     # Whole vectors of columns are evaluated: there may be a few more than are in use.
     width_of_series = whole_registers(columns, codes.WIDE)
-    width = max(degree, codes.HIGHEST_ORDER if method.order else 0) + 4
+    width = max(degree, codes.HIGHEST_ORDER if method.order else 0, codes.LEADING) + 4
     shapes = {
         "stages": (stages, length + 1),
-        "speeds": (stages,),
+        "speeds": (2, stages),
         "trial": (length,),
         "new": (length,),
         "error": (length,),
@@ -176,11 +181,12 @@ def work_layout(method: Any, dimension: int, tangents: int, columns: int, rows: 
         "state": (n,),
         "settled": (n,),
         "departure": (n,),
+        "path_error": (n,),
         "scale_before": (n,),
         "saltation": (n, n),
         "sizes": (n, n),
         "rounding": (4, n),
-        "path": (degree + 1, n + 1),
+        "path": (degree + 3, n + guards),
         "polynomial": (width,),
         "stack": (ISOLATION_DEPTH, width),
         "intervals": (ISOLATION_DEPTH, 2),

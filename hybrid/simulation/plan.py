@@ -131,6 +131,7 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: i
         )
         model = compiled.moved_by(compiled.moving(kinds, tangents), np.array(kinds, dtype=np.int64))
         columns, rows = compiled.series_columns(tangents), compiled.emitted.programs.longest
+        guards = int(np.diff(model.first_outgoing).max(initial=0))
         plan = Plan(
             method,
             load_kernels().advance,
@@ -140,7 +141,7 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: i
             {name: codes.PROPAGATORS[kind] for name, kind in zip(system.mode_names, kinds, strict=True)},
             dense_degree(compiled, method, kinds),
             run_layout(n, tangents, modes, transitions, system.first_tick[-1]),
-            work_layout(method, n, tangents, columns, rows),
+            work_layout(method, n, tangents, guards, columns, rows),
             partial(ticks_of, system) if system.first_tick[-1] else None,
         )
         while len(compiled.plans) >= MOST_LAYOUTS:

@@ -94,7 +94,7 @@ def matrices_at(
     n = system.dimension
     matrices, transversalities = np.empty((len(states), n, n)), np.empty(len(states))
     kernel = load_kernels("hybrid.kernels.jumps.jump").saltation
-    work, x_plus = workspace(kernel_method(Tsit5(), False), n, 0, 0), np.empty(n)
+    work, x_plus = workspace(kernel_method(Tsit5(), False), n), np.empty(n)
     for i, (fired, phase, state) in enumerate(zip(transitions, phases, states, strict=True)):
         transversalities[i] = kernel(model, fired, phase, state, x_plus, work)
         matrices[i] = work.saltation

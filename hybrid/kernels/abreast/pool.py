@@ -78,7 +78,7 @@ def take_ashore(sea, task, row):
     run.distant = 1 if fired == NO_TRANSITION and (sea.distant >> row) & 1 else 0
     if fired != NO_TRANSITION:
         clock = 0 if model.propagator[mode] == DESINGULARISED else -1
-        path = Path(work.series, order, clock, t, 1.0, sea.ends[ABREAST + row], False)
+        path = Path(work.series, order, clock, t, 1.0, sea.ends[ABREAST + row], False, 1)
         span += land(model, run, tangents, fired, path, span, work)
         run.pending = fired
         keep_scale(model, run, on_guard, t + span, work)

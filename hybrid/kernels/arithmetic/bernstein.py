@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from hybrid.kernels.types.options import INLINE, KERNEL
+from hybrid.kernels.types.options import INLINE
 
 # Returned instead of a share of a step if there is none: beyond the end of every step.
 NO_ROOT = 2.0
@@ -34,11 +34,3 @@ def stays(coefficients, degree, side, band):
         if not coefficients[i] * side > band:
             return False
     return True
-
-
-@njit(**KERNEL)
-def divide_by_theta(coefficients, degree):
-    """Divide, in place, a polynomial that vanishes at 0 by its variable; returns the new degree."""
-    for i in range(degree):
-        coefficients[i] = coefficients[i + 1] * degree / (i + 1)
-    return degree - 1

@@ -12,7 +12,7 @@ ROUNDING = 16.0
 @njit(**INLINE)
 def up_to(path, length):
     """The path up to another value of its variable."""
-    return Path(path.powers, path.degree, path.clock, path.start, path.pace, length, path.exact)
+    return Path(path.powers, path.degree, path.clock, path.start, path.pace, length, path.exact, path.root)
 
 
 @njit(**INLINE)
@@ -32,11 +32,15 @@ def state_at(path, n, s, out):
 
 
 @njit(**INLINE)
+def time_along(path, s):
+    """The time since the start at ``s``."""
+    return path.pace * s if path.clock < 0 else value_at(path.powers, path.clock, path.degree, s)
+
+
+@njit(**INLINE)
 def time_at(path, s):
     """Time at ``s``."""
-    if path.clock < 0:
-        return path.start + path.pace * s
-    return path.start + value_at(path.powers, path.clock, path.degree, s)
+    return path.start + time_along(path, s)
 
 
 @njit(**INLINE)

@@ -1,15 +1,4 @@
-"""Whether a step tells on which side of a guard the solution is.
-
-Error control keeps the error of a step below the tolerances, not below the state: a state that decays below
-its absolute tolerance may have either sign at the end of a step, and anything between. A change of side found
-there is one of the error. So a step on which a guard changes sides, or grazes, must tell the sides at its
-ends, unless the guard moves on through zero; else the step is repeated with a shorter length, on which the
-error is smaller.
-
-A field that is not smooth at a guard has such an error on every step that reaches the guard. The steps then
-end at the guard as far as rounding of time tells. ``h' = -sqrt(abs(h)) * sign(h)`` comes to rest at zero so,
-and its level has reached the guard ``h`` there.
-"""
+"""What a step tells of the sides of guards, and whether a field holds the state at one."""
 
 from numba import njit
 
@@ -19,8 +8,6 @@ from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION
 from hybrid.kernels.types.options import INLINE, KERNEL
 
-# The signs at the ends of a step must bear so many times its estimated error.
-MARGIN = 100.0
 # The side of a guard before an event, in ``run.rehearsal``, if the step before has not told it.
 NOT_KNOWN = 2
 # The last terms of a series for a guard below this size may have lost their digits.
@@ -101,22 +88,6 @@ def restore_sides(model, run):
 
 
 @njit(**KERNEL)
-def keeps_sign(model, transition, t, x, work):
-    """Whether a guard has one sign for all errors of the state, ``work.field_after``, on a straight line."""
-    positive = False
-    for part in range(2):
-        share = MARGIN if part == 0 else -MARGIN
-        for i in range(model.dimension):
-            work.state[i] = x[i] + share * work.field_after[i]
-        value = guard_value(model, transition, t, work.state, work.scalar)
-        if part == 0:
-            positive = value > 0.0
-        elif (value > 0.0) != positive:
-            return False
-    return True
-
-
-@njit(**KERNEL)
 def underflows(model, transition, t, x, later, y, scalar):
     """Whether a guard is too small for a sign at both of two places, but not zero."""
     first = abs(guard_value(model, transition, t, x, scalar))
@@ -133,16 +104,6 @@ def speed_displaced(model, transition, mode, t, x, distance, work):
     displace(model, x, distance, work.gradient, work.state)
     model.field(mode, t, work.state, model.parameters, work.field_after)
     return guard_speed(model, transition, t, work.state, work.field_after, work.gradient)
-
-
-@njit(**KERNEL)
-def field_holds(model, transition, mode, t, x, speed, work):
-    """Whether the field on the other side of a guard, as far beyond it, does not lead on to that side.
-
-    ``speed`` is the guard's speed at ``x``, and leads towards the guard; ``work.gradient`` is current.
-    """
-    value = guard_value(model, transition, t, x, work.scalar)
-    return not speed_displaced(model, transition, mode, t, x, -2.0 * value, work) * speed > 0.0
 
 
 @njit(**KERNEL)

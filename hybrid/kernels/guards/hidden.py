@@ -17,7 +17,7 @@ from hybrid.kernels.events.guards import (
     rounding_band,
 )
 from hybrid.kernels.events.onset import AT_REST
-from hybrid.kernels.guards.pieces import NO_COLUMN, as_column, bounds_on, sample
+from hybrid.kernels.guards.pieces import NO_COLUMN, bounds_on, in_column, sample
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
@@ -61,7 +61,7 @@ def hidden_until(model, method, run, path, guard, end, work):
     model.guard_gradient(transition, start, run.y, model.parameters, work.gradient)
     error = 0.0 if path.exact else error_band(method, run, work.gradient, model.controlled)
     rounding = rounding_band(model, run, transition, start, run.y, work)
-    error, rounding = as_column(model, run, guard, error), as_column(model, run, guard, rounding)
+    error, rounding = in_column(path, guard.column, error), in_column(path, guard.column, rounding)
     size = farthest_from_zero(model, path, guard, length, work)
     if guard.on_guard == AT_REST and size < math.inf:
         # What is zero at the start and rests there has a size and rounding on the step.

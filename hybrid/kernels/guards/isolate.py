@@ -33,11 +33,11 @@ from hybrid.kernels.guards.pieces import (
     NO_COLUMN,
     NOWHERE,
     Guard,
-    as_column,
     bounds_at,
     certain_sign,
     distance_at,
     halves_tell_more,
+    in_column,
     is_short,
     known_at,
     may_have_crossed,
@@ -48,7 +48,6 @@ from hybrid.kernels.guards.pieces import (
 )
 from hybrid.kernels.guards.sampled import SETTLED, sampled_change
 from hybrid.kernels.guards.touch import note_touch
-from hybrid.kernels.types.codes import DESINGULARISED, ROOTED
 from hybrid.kernels.types.kinds import INTEGER, REAL, Pair
 from hybrid.kernels.types.layout import Method, Model, Path, Run, Work
 from hybrid.kernels.types.options import INLINE, KERNEL, exported
@@ -73,14 +72,13 @@ NO_TOUCH = Touch(NOWHERE, math.inf)
 
 
 @njit(**KERNEL)
-def guard_at_start(model, run, transition, column):
+def guard_at_start(run, transition, column, path):
     """A guard as the run knows it at the start of a step.
 
     The root of a guard that is zero without speed begins to grow like its variable, too.
     """
     side, on_guard = run.side[transition], run.on_guard[transition]
-    rooted = model.propagator[run.mode] == DESINGULARISED or model.propagator[run.mode] == ROOTED
-    if rooted and column != NO_COLUMN and on_guard == LATER:
+    if path.root > 1 and column != NO_COLUMN and on_guard == LATER:
         on_guard = BY_SPEED
     return Guard(transition, column, side, on_guard, 0.0, 0.0, 0.0)
 
@@ -99,7 +97,7 @@ def _tolerated(model, method, run, path, guard, piece, work):
         band = gradient_band(model, run, t, work.gradient)
     else:
         band = error_band(method, run, work.gradient, model.controlled)
-    return as_column(model, run, guard, band)
+    return in_column(path, guard.column, band)
 
 
 @njit(**KERNEL)
@@ -267,7 +265,7 @@ def crossing_on_path(model, method, run, transition, column, path, end, work):
     crossing, or at the end, goes to ``run.rehearsal[3, transition]``. The guard is no longer held to be zero
     at the start of the step, unless it rests there.
     """
-    guard, length = guard_at_start(model, run, transition, column), path.length
+    guard, length = guard_at_start(run, transition, column, path), path.length
     hidden, rests = _hidden_at_start(model, method, run, path, guard, end, work)
     run.rehearsal[3, transition] = guard.side
     if rests:

@@ -15,14 +15,12 @@ from hybrid.kernels.events.onset import AT_REST, BY_SPEED
 from hybrid.kernels.events.path import state_at, time_at
 from hybrid.kernels.guards.touch import APART
 from hybrid.kernels.types.codes import (
-    DESINGULARISED,
     HIGH,
     HIGH_MIDDLE,
     LEAST_SLOPE,
     LOW,
     LOW_MIDDLE,
     MOST_SLOPE,
-    ROOTED,
 )
 from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH
 from hybrid.kernels.types.layout import EPSILON
@@ -98,12 +96,11 @@ class Piece(NamedTuple):
 
 
 @njit(**INLINE)
-def as_column(model, run, guard, size):
+def in_column(path, column, size):
     """How large a size of a guard is in its column, which may hold the guard's root."""
-    rooted = model.propagator[run.mode] == DESINGULARISED or model.propagator[run.mode] == ROOTED
-    if guard.column == NO_COLUMN or not rooted:
+    if column == NO_COLUMN or path.root == 1:
         return size
-    return math.sqrt(size) if model.root[run.mode] == 2 else size ** (1.0 / model.root[run.mode])
+    return math.sqrt(size) if path.root == 2 else size ** (1.0 / path.root)
 
 
 @njit(**INLINE)

@@ -219,7 +219,7 @@ def way_is_free(model, method, run, turn, span, work):
         if run.due[other] == 1 or (turned and crosses_towards(model.direction[other], side)):
             return False
         if has_program(model, other):
-            way = Path(path, 1, -1, t, span, 1.0, True)
+            way = Path(path, 1, -1, t, span, 1.0, True, 1)
             guard = Guard(other, NO_COLUMN, side, 0, 0.0, 0.0, 0.0)
             place, _, _ = first_change(model, method, run, way, guard, 0.0, work)
             crossed = place != NOWHERE

@@ -4,7 +4,7 @@ from numba import int64, njit
 
 from hybrid.kernels.arithmetic.clock import IN_ORDER
 from hybrid.kernels.events.path import value_at
-from hybrid.kernels.steps.series_roots import time_of
+from hybrid.kernels.guards.roots import time_of
 from hybrid.kernels.types.kinds import CUBE, INDICES, MATRIX, VECTOR
 from hybrid.kernels.types.options import KERNEL, exported
 

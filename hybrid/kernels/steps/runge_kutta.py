@@ -4,27 +4,16 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.tangent import independence
-from hybrid.kernels.events.guards import (
-    guard_value,
-    is_forced,
-    rounding_band,
-    sides_at,
-)
-from hybrid.kernels.events.path import state_at, time_at
+from hybrid.kernels.events.guards import ROUNDING_OF_STATE, guard_value, is_forced, sides_at
+from hybrid.kernels.events.onset import BY_SPEED
+from hybrid.kernels.events.path import state_at
 from hybrid.kernels.events.record import start_record
 from hybrid.kernels.events.resolution import restore_sides
+from hybrid.kernels.guards.first_event import first_event, keep_error
 from hybrid.kernels.guards.touch import note_touch, remember_touch, share_with_one_touch
-from hybrid.kernels.steps.runge_kutta_guards import (
-    NOT_THERE,
-    earliest_crossing,
-    is_beyond,
-    land_on_first,
-    reach,
-    reach_any,
-)
+from hybrid.kernels.steps.runge_kutta_landing import NOT_THERE, land_on_first, reach_any, sign_at_end
 from hybrid.kernels.steps.step import (
     attempt,
     attempt_again,
@@ -124,6 +113,58 @@ def accept(model, method, run, tangents, h, correction, work):
         run.divergence += h * total + correction * work.stages[s, place]
 
 
+@njit(**KERNEL)
+def affine_column(model, method, run, transition, column, h, path, work):
+    """An affine guard on the interpolant into a column of a path, and the sum of its magnitudes behind it.
+
+    It is zero at the start if the run knows that: its value there is rounding. So is a power whose terms
+    cancel, unless the run knows that the guard has a speed.
+    """
+    n, rows, speeds, sizes = model.dimension, path.powers, work.speeds[0], work.speeds[1]
+    start = (
+        0.0
+        if run.on_guard[transition] > 0
+        else guard_value(model, transition, path.start, run.y, work.scalar)
+    )
+    model.guard_gradient(transition, path.start, run.y, model.parameters, work.gradient)
+    for j in range(method.a.shape[0]):
+        speeds[j], sizes[j] = 0.0, 0.0
+        for i in range(n):
+            speeds[j] += work.gradient[i] * work.stages[j, i]
+            sizes[j] += abs(work.gradient[i] * work.stages[j, i])
+    rows[0, column], rows[path.degree + 2, column] = start, abs(start)
+    for k in range(1, path.degree + 1):
+        known = k == 1 and run.on_guard[transition] == BY_SPEED
+        total, terms = (work.gradient[n], abs(work.gradient[n])) if k == 1 else (0.0, 0.0)
+        for j in range(method.a.shape[0]):
+            total += method.powers[k, j] * speeds[j]
+            terms += abs(method.powers[k, j]) * sizes[j]
+        rows[k, column] = h * total if known or abs(total) > ROUNDING_OF_STATE * EPSILON * terms else 0.0
+        rows[path.degree + 2, column] += abs(rows[k, column])
+
+
+@njit(**KERNEL)
+def path_of_attempt(model, method, run, h, work):
+    """The path of an attempted step: its interpolant, with affine guards behind the state, and its error."""
+    n, mode, t, path = model.dimension, run.mode, run.phase, path_of_step(method, run.phase, h, work)
+    rows, first = path.powers, model.first_outgoing[mode]
+    if not all_affine(model, mode):
+        interpolant_path(method, h, run.y, n, work)
+    for i in range(n):
+        # Where a step is too long, either estimate may be close to zero.
+        error = h * (abs(work.error[i]) + abs(work.second_error[i]))
+        keep_error(i, error, max(abs(run.y[i]), abs(work.new[i]), abs(h * work.stages[0, i])), work)
+        rows[path.degree + 1, i] = work.new[i]
+        if all_affine(model, mode):
+            rows[0, i], rows[1, i] = run.y[i], h * work.stages[0, i]
+    for slot in range(first, model.first_outgoing[mode + 1]):
+        transition, column = model.outgoing[slot], n + slot - first
+        if model.affine_guard[transition] == 1:
+            affine_column(model, method, run, transition, column, h, path, work)
+            rows[path.degree + 1, column] = guard_value(model, transition, t + h, work.new, work.scalar)
+    return path
+
+
 @njit(**INLINE)
 def find_event(task, h, interpolated):
     """Shorten the attempted step to its first event, if there is one.
@@ -133,25 +174,26 @@ def find_event(task, h, interpolated):
     Returns its length, the Euler step that completes it, and the transition. A step whose guards
     are proved on a part only is cut to that. A crossing that the interpolant has and the solution has not is
     a grazing; the step is then searched again without that guard. A step whose error may have made the
-    crossing has the length zero and no transition. At a guard that holds the state, steps become as short as
-    rounding of time allows: there the state has reached the guard, and a transition in that direction fires.
-    Without one, or if it has just fired, the length is nan.
+    crossing has the length zero and no transition, unless rounding of time allows none that is shorter.
     """
     attempts, model, method, run, _, work = task_of(task)
-    mode, t, path = run.mode, run.phase, path_of_step(method, run.phase, h, work)
-    ignored, touched = NO_TRANSITION, 0.0
+    mode, t, ignored, touched = run.mode, run.phase, NO_TRANSITION, 0.0
     for trial in range(2):
         if not (interpolated and trial == 0):
             interpolation_stages(model, method, mode, t, h, run.y, work)
-        if not all_affine(model, mode):
-            interpolant_path(method, h, run.y, model.dimension, work)
-        theta, fired, proved, blurred = earliest_crossing(
-            attempts, model, method, run, path, ignored, touched, work
+        path = path_of_attempt(model, method, run, h, work)
+        theta, fired, proved, blurred = first_event(
+            attempts, model, method, run, path, True, ignored, touched, work
         )
         if blurred != NO_TRANSITION:
-            reached, correction, first = reach_blurred(task, h, blurred)
-            if reached != h:
-                return reached, correction, first
+            restore_sides(model, run)
+            if SHORTER * h > FINEST * measured_time(model, run, mode):
+                return 0.0, 0.0, NO_TRANSITION
+            correction, first = reach_any(task, h)
+            if first != NO_TRANSITION:
+                return 0.0, correction, first
+            attempt_again(task, h)
+            return h, 0.0, NO_TRANSITION
         if proved < min(theta, 1.0):
             attempt_again(task, proved * h)
             return proved * h, 0.0, NO_TRANSITION
@@ -161,14 +203,14 @@ def find_event(task, h, interpolated):
         shortened, correction, first = land_on_first(task, fired, h, theta)
         if shortened != NOT_THERE:
             return shortened, correction, first
-        drowned = drowns(model, run, fired, path, theta, work)
-        if not drowned:
-            attempt_again(task, h)
-            drowned = is_beyond(model, run, fired, side, t + h, work)
-        if drowned:
+        attempt_again(task, h)
+        beyond = sign_at_end(model, run, fired, t + h, work) == -side
+        attempt_again(task, theta * h)
+        bent = model.affine_guard[fired] == 0
+        if beyond or (bent and sign_at_end(model, run, fired, t + theta * h, work) == 0):
             # Only a flight at the level of rounding lies between: the guard is as zero as it can be there.
-            attempt_again(task, theta * h)
             return theta * h, 0.0, fired
+        attempt_again(task, h)
         ignored, touched = fired, theta
         note_touch(run, fired, theta, 0.0)
     share = share_with_one_touch(run)
@@ -176,48 +218,6 @@ def find_event(task, h, interpolated):
         attempt_again(task, share * h)
         return share * h, 0.0, NO_TRANSITION
     return h, 0.0, NO_TRANSITION
-
-
-@njit(**KERNEL)
-def reach_blurred(task, h, blurred):
-    """As ``find_event``, for a step whose error may have made the crossing of ``blurred``.
-
-    The length is ``h``, and the step as it was, if the step cannot be shorter and the guard is not reached.
-    """
-    _, model, _, run, _, work = task_of(task)
-    side = run.rehearsal[0, blurred]
-    if SHORTER * h > FINEST * measured_time(model, run, run.mode):
-        restore_sides(model, run)
-        return 0.0, 0.0, NO_TRANSITION
-    length = reach(model, run, blurred, run.phase, h, task.tangents, work)
-    if length == NOT_THERE:
-        attempt_again(task, h)
-        return h, 0.0, NO_TRANSITION
-    restore_sides(model, run)
-    run.rehearsal[3, blurred] = side
-    returns = run.last_fired == blurred and run.since_entry <= max(h, EPSILON * abs(run.phase))
-    if crosses_towards(model.direction[blurred], -side) and not returns:
-        return 0.0, length, blurred
-    return math.nan, 0.0, NO_TRANSITION
-
-
-@njit(**KERNEL)
-def drowns(model, run, transition, path, theta, work):
-    """Whether a flight from a bent guard back to it, to the share ``theta`` of the step, is all rounding.
-
-    The slope of the guard has told where such a flight ends; the values of the guard on the way do not.
-    """
-    if model.affine_guard[transition] == 1:
-        return False
-    for part in range(3):
-        place = 0.5 * part * theta
-        state_at(path, model.dimension, place, work.state)
-        t = time_at(path, place)
-        value = guard_value(model, transition, t, work.state, work.scalar)
-        model.guard_gradient(transition, t, work.state, model.parameters, work.gradient)
-        if abs(value) > rounding_band(model, run, transition, t, work.state, work):
-            return False
-    return True
 
 
 @njit(**INLINE)
@@ -278,7 +278,7 @@ def reject(task, h, ratio):
     Where no step can be shorter, the run ends, unless a guard is there.
     """
     _, model, method, run, _, work = task_of(task)
-    mode, tangents = run.mode, task.tangents
+    mode = run.mode
     run.rejected += 1
     shrink = max(SHRINK, SAFETY * ratio ** (-method.exponent)) if ratio > 1.0 else 0.1
     run.next_step = h * shrink
@@ -287,11 +287,10 @@ def reject(task, h, ratio):
         finest = moves_nothing(model, run, work.stages[0], h * shrink)
     if not (finest or h * shrink < 1e-200):
         return GO_ON, 0.0
-    # The field may end at a guard, as ``sqrt(h)`` does at ``h``.
-    correction, run.pending = reach_any(model, run, run.phase, h, tangents, work)
+    correction, run.pending = reach_any(task, h)
     if run.pending == NO_TRANSITION:
         return STEP_TOO_SMALL if ratio > 1.0 else NON_FINITE, 0.0
-    accept(model, method, run, tangents, 0.0, correction, work)
+    accept(model, method, run, task.tangents, 0.0, correction, work)
     return GO_ON, correction
 
 
@@ -371,8 +370,6 @@ def runge_kutta_step(task, remaining):
     guarded = model.first_outgoing[mode + 1] > model.first_outgoing[mode]
     if guarded:
         h, correction, fired = find_event(task, h, interpolated)
-        if math.isnan(h):
-            return STEP_TOO_SMALL, 0.0
         # Where the field ends at the guard, a landing may have no value: a shorter step comes nearer to it.
         if h == 0.0 if fired == NO_TRANSITION else is_lost(model, work):
             restore_sides(model, run)

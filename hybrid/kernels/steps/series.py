@@ -20,10 +20,11 @@ from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.events.path import state_at, time_at, up_to, value_at
 from hybrid.kernels.events.record import start_record
 from hybrid.kernels.events.resolution import restore_sides
+from hybrid.kernels.guards.first_event import first_event
+from hybrid.kernels.guards.roots import time_of
 from hybrid.kernels.guards.touch import remember_touch
 from hybrid.kernels.instructions.registers import whole_registers
 from hybrid.kernels.steps.field.residual import followed
-from hybrid.kernels.steps.series_guards import earliest_on_series
 from hybrid.kernels.steps.series_length import (
     EXACT_TOLERANCE,
     MOST_BITS,
@@ -33,7 +34,6 @@ from hybrid.kernels.steps.series_length import (
     longest_step,
     within_floats,
 )
-from hybrid.kernels.steps.series_roots import time_of
 from hybrid.kernels.steps.step import moves_nothing, rates_by_jacobian
 from hybrid.kernels.types.codes import (
     DESINGULARISED,
@@ -229,7 +229,8 @@ def expanded(model, method, run, tangents, work):
         set_origins(model, run, order, work.series)
     # A run may be taken on without its tangent vectors: the columns are those of what is passed.
     model.series(mode, run.phase, run.y[: n * (1 + tangents)], model.parameters, order, work.series)
-    return Path(work.series, order, clock, run.phase, 1.0, math.inf, kind == EXACT)
+    root = model.root[mode] if holds_roots(model, mode) else 1
+    return Path(work.series, order, clock, run.phase, 1.0, math.inf, kind == EXACT, root)
 
 
 @njit(**INLINE)
@@ -255,7 +256,7 @@ def trusted(task, path, remaining):
             h = min(h, unhurried(series, model.controlled, run))
     else:
         h = min(h, 1e100)
-    path = Path(series, order, clock, path.start, 1.0, h, path.exact)
+    path = Path(series, order, clock, path.start, 1.0, h, path.exact, path.root)
     if is_forced(model, mode):
         return up_to(path, attempts.explained_series(model, method, run, tangents, path, work))
     if polynomial or clock >= 0 or is_regular(series, n, order, tolerance, last, growth, work.weights):
@@ -287,14 +288,18 @@ def up_to_event(task, path):
     """The path up to its first event, the transition, and whether it is cut before, where it is proved."""
     attempts, model, method, run, record, work = task_of(task)
     mode, finest = run.mode, FINEST * measured_time(model, run, run.mode)
-    theta, fired, proved, blurred = earliest_on_series(attempts, model, method, run, path, work)
+    theta, fired, proved, blurred = first_event(
+        attempts, model, method, run, path, False, NO_TRANSITION, 0.0, work
+    )
     for _ in range(MOST_SHORTER):
         if blurred == NO_TRANSITION or SHORTER * path.length <= finest:
             break
         path = up_to(path, SHORTER * path.length)
         evaluate_end(model, mode, path)
         restore_sides(model, run)
-        theta, fired, proved, blurred = earliest_on_series(attempts, model, method, run, path, work)
+        theta, fired, proved, blurred = first_event(
+            attempts, model, method, run, path, False, NO_TRANSITION, 0.0, work
+        )
     end = min(theta, proved, 1.0)
     if run.grazing_place <= end:
         s = run.grazing_place * path.length

@@ -157,7 +157,7 @@ def interpolant_path(method, h, y, dimension, work):
 @njit(**INLINE)
 def path_of_step(method, t, h, work):
     """The path that ``interpolant_path`` writes, for a step from ``t``."""
-    return Path(work.path, method.powers.shape[0] - 1, -1, t, h, 1.0, False)
+    return Path(work.path, method.powers.shape[0] - 1, -1, t, h, 1.0, False, 1)
 
 
 @njit(**KERNEL)

@@ -50,7 +50,8 @@ class Path(NamedTuple):
 
     ``powers (>= degree + 1, columns)`` are the coefficients of the state's components in powers of the
     variable. Time is ``start`` plus ``pace`` times the variable if ``clock`` is negative; otherwise it is
-    ``start`` plus the column ``clock``. An ``exact`` path has no error of a method.
+    ``start`` plus the column ``clock``. An ``exact`` path has no error of a method. Guards that are columns
+    behind the state may be there by their roots, of the order ``root``; 1 for the guards themselves.
     """
 
     powers: MATRIX
@@ -60,6 +61,7 @@ class Path(NamedTuple):
     pace: REAL
     length: REAL
     exact: TRUTH
+    root: INTEGER
 
 
 # ``bounds.bound_guard`` and ``bounds.spread_by_rounding``.
@@ -282,13 +284,14 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
 class Work(Structure):
     """Scratch memory, allocated once a run.
 
-    ``stages (S, N + 1)`` of the current step, the divergence last in each row, and ``speeds (S,)`` of a guard
-    along them; ``trial, new, error, second_error (N,)``; ``jacobian, reset_jacobian (n, n + 1)``; ``gradient
-    (n + 1,)``; ``scalar (1,)``; ``field, field_after, state, settled (n,)``; ``departure (n,)``, the state
-    before the step; ``scale_before (n,)``, sizes of the state that the run goes back to;
-    ``saltation, sizes (n, n)``; ``rounding (4, n)``, how far the rates move, and the place
-    where a guard's derivatives are asked for; ``path (d + 1, n + 1)``, the powers of the step's interpolant
-    and of a guard on it;
+    ``stages (S, N + 1)`` of the current step, the divergence last in each row, and ``speeds (2, S)`` of a
+    guard along them, with the sizes of their terms; ``trial, new, error, second_error (N,)``; ``jacobian,
+    reset_jacobian (n, n + 1)``; ``gradient (n + 1,)``; ``scalar (1,)``; ``field, field_after, state, settled
+    (n,)``; ``departure (n,)``, the state before the step; ``path_error (n,)``, how far a step may be off at
+    its end; ``scale_before (n,)``, sizes of the state that the run goes back to; ``saltation, sizes (n, n)``;
+    ``rounding (4, n)``, how far the rates move, and the place where a guard's derivatives are asked for;
+    ``path (d + 3, n + guards)``, the powers of the step's
+    interpolant and of guards on it, their values at its end and what these are sums of;
     ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for its isolation; ``registers (r, 6)``,
     what is known of each row of a program, and ``samples (nodes + 1, 2 r)`` the ranges of these rows at the
     nodes of a step and what they have in common; ``rates (2, N)``, the field along a step.
@@ -302,7 +305,7 @@ class Work(Structure):
     """
 
     stages: MATRIX
-    speeds: VECTOR
+    speeds: MATRIX
     trial: VECTOR
     new: VECTOR
     error: VECTOR
@@ -316,6 +319,7 @@ class Work(Structure):
     state: VECTOR
     settled: VECTOR
     departure: VECTOR
+    path_error: VECTOR
     scale_before: VECTOR
     saltation: MATRIX
     sizes: MATRIX

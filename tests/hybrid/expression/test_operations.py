@@ -161,7 +161,7 @@ def test_interval_programs_hold_values_and_slopes(kind):
     registers = np.full((len(written.rows), REGISTERS), np.nan)
     for a, b in zip(places(kind)[::2], places(kind)[1::2], strict=True):
         for radius in (0.0, 1e-3, 0.25):
-            path = layout.Path(np.array([a, b - a]), 1, -1, 0.0, 1.0, 0.5 + radius, True)
+            path = layout.Path(np.array([a, b - a]), 1, -1, 0.0, 1.0, 0.5 + radius, True, 1)
             row = registers[row_of(program, path, radius, registers)]
             along = 0.5 + np.linspace(-radius, radius, 31)
             values = np.array([float(kind.numpy(*x)) for x in a + np.outer(along, b - a)])

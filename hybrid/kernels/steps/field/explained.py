@@ -108,7 +108,7 @@ def explained_step(model, method, run, h, work):
     """
     for i in range(model.dimension):
         work.path[0, i], work.path[1, i] = run.y[i], work.stages[0, i]
-    path = Path(work.path, 1, -1, run.phase, 1.0, h, False)
+    path = Path(work.path, 1, -1, run.phase, 1.0, h, False, 1)
     return _longest_explained(model, method, run, path, method.nodes, IN_TIME, work)
 
 

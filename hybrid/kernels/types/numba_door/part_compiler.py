@@ -23,9 +23,9 @@ from hybrid.kernels.types.numba_door.lowering import KernelLowering
 THOROUGHLY = (
     "hybrid.kernels.arithmetic.tangent",
     "hybrid.kernels.steps.series",
-    "hybrid.kernels.steps.series_guards",
+    "hybrid.kernels.guards.first_event",
     "hybrid.kernels.steps.series_length",
-    "hybrid.kernels.steps.series_roots",
+    "hybrid.kernels.guards.roots",
 )
 # Numba's passes that change nothing in a kernel. The legalisation marks where variables end, which only
 # references need.

@@ -1,4 +1,4 @@
-"""Polynomials in Bernstein form: division by the variable, and the proof that there is no root."""
+"""Polynomials in Bernstein form: the proof that there is no root, and halves."""
 
 from math import comb
 
@@ -18,13 +18,6 @@ def in_bernstein_form(powers, degree):
     return np.array(
         [sum(powers[j] * comb(k, j) / comb(degree, j) for j in range(k + 1)) for k in range(degree + 1)]
     )
-
-
-@given(st.lists(st.floats(-5, 5), min_size=1, max_size=7))
-def test_a_division_takes_out_exactly_the_root_at_zero(powers):
-    coefficients = in_bernstein_form([0.0, *powers], 8)
-    assert kernels.divide_by_theta(coefficients, 8) == 7
-    np.testing.assert_allclose(coefficients[:8], in_bernstein_form(powers, 7), rtol=1e-13, atol=1e-13)
 
 
 @given(st.lists(st.floats(-2, 3), min_size=1, max_size=7), st.sampled_from([-1, 1]), st.floats(0, 0.1))

@@ -46,7 +46,7 @@ TRUTHS = {
 
 @njit
 def _row(programs, path, clock, middle, radius, registers):
-    along = Path(path, path.shape[0] - 1, clock, START, PACE, middle + radius, True)
+    along = Path(path, path.shape[0] - 1, clock, START, PACE, middle + radius, True, 1)
     return _bound(programs, 0, along, middle, radius, registers)
 
 

@@ -42,7 +42,7 @@ def powers(roots, pairs=()):
 def crossing(coefficients, side, direction=0, on_guard=0, hidden=0.0):
     """Place of the first crossing on [0, 1] of a polynomial in powers, and the side after it."""
     coefficients = np.array([[float(each)] for each in coefficients])
-    path = Path(coefficients, len(coefficients) - 1, -1, 0.0, 1.0, 1.0, True)
+    path = Path(coefficients, len(coefficients) - 1, -1, 0.0, 1.0, 1.0, True, 1)
     model = SimpleNamespace(
         dimension=1,
         period=0.0,

@@ -1,0 +1,229 @@
+"""Landing on an event of a Runge-Kutta step: the step is taken again up to its guard."""
+
+import math
+from typing import NamedTuple
+
+from numba import njit
+
+from hybrid.kernels.arithmetic.bernstein import NO_ROOT, crosses_towards
+from hybrid.kernels.arithmetic.clock import measured_time
+from hybrid.kernels.events.guards import guard_speed, guard_value, may_jump, rounding_band
+from hybrid.kernels.events.resolution import speed_displaced
+from hybrid.kernels.steps.step import attempt_again
+from hybrid.kernels.types.codes import NO_TRANSITION
+from hybrid.kernels.types.kinds import REAL, TRUTH
+from hybrid.kernels.types.layout import EPSILON
+from hybrid.kernels.types.options import INLINE, KERNEL
+from hybrid.kernels.types.task import task_of
+
+# Below this share of the step, one Euler step completes a correction: the error left is its square.
+EULER_IS_ENOUGH = 1e-8
+# Largest Newton step, as a share of the step, for a guard that may have kinks and jumps.
+FARTHEST = 1e-3
+# First distance, as a share of the step, at which the other side of a guard is searched.
+FIRST_REACH = 1e-10
+MOST_LANDINGS = 200
+NOT_THERE = -1.0
+
+
+@njit(**KERNEL)
+def reach(model, run, transition, t, h, tangents, work):
+    """The Euler step, of at most ``h``, that takes the state to a guard as near as rounding of time tells.
+
+    The end is in ``work.new``. Returns the length of the step, or ``NOT_THERE`` if the guard is farther away,
+    or does not hold the state: then the field as far beyond the guard leads on.
+    """
+    value = guard_value(model, transition, t, run.y, work.scalar)
+    speed = guard_speed(model, transition, t, run.y, work.stages[0], work.gradient)
+    if not speed * value < 0.0 or not abs(value) <= abs(speed) * h:
+        return NOT_THERE
+    length = -value / speed
+    for i in range(model.dimension * (1 + tangents)):
+        work.new[i] = run.y[i] + length * work.stages[0, i]
+    beyond = speed_displaced(model, transition, run.mode, t, run.y, -2.0 * value, work)
+    return length if not beyond * speed > 0.0 else NOT_THERE
+
+
+@njit(**KERNEL)
+def reach_any(task, h):
+    """``reach`` for the first guard of the mode that is there and fires; the transition comes second.
+
+    A field that is not smooth at a guard has an error on every step that reaches the guard, until rounding
+    of time allows none that is shorter: ``h' = -sqrt(h)`` comes to rest at zero so, and may end there.
+    """
+    _, model, _, run, _, work = task_of(task)
+    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
+        run.rehearsal[3, model.outgoing[slot]] = 0
+    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
+        transition = model.outgoing[slot]
+        side = run.side[transition]
+        if run.on_guard[transition] == 0 and crosses_towards(model.direction[transition], -side):
+            length = reach(model, run, transition, run.phase, h, task.tangents, work)
+            if length != NOT_THERE:
+                run.rehearsal[3, transition] = side
+                return length, transition
+    return NOT_THERE, NO_TRANSITION
+
+
+class Lengths(NamedTuple):
+    """The lengths of a step between which its end passes a guard.
+
+    The guard has been seen on its side at ``low`` if ``before``, and not on it at ``high`` if ``after``.
+    """
+
+    low: REAL
+    high: REAL
+    before: TRUTH
+    after: TRUTH
+
+
+@njit(**INLINE)
+def narrowed(bracket, length, short):
+    """A bracket after a length that is too short, or long enough."""
+    low, high, before, after = bracket
+    if short:
+        return Lengths(length, high, True, after)
+    return Lengths(low, length, before, True)
+
+
+@njit(**KERNEL)
+def searched_at(bracket, begins, distance, h):
+    """The length at which the other side of a guard is searched, at a distance; with what is known then.
+
+    The length is ``NOT_THERE`` if no place is left. The guard is on its side at the start if it ``begins``
+    there.
+    """
+    low, high, before, after = bracket
+    length = low + distance if before else high - distance
+    if before and low < h <= length:
+        # The end of the step is the farthest place.
+        return h, bracket
+    if begins and after and length <= low:
+        # The start of the step is the farthest place on this side.
+        return 0.5 * high, Lengths(low, high, True, after)
+    return length if low < length < high else NOT_THERE, bracket
+
+
+@njit(**KERNEL)
+def turns_back(model, run, transition, side, t, s, work):
+    """Whether a guard that does not jump leads back to its side, where a step ends within its rounding."""
+    speed = guard_speed(model, transition, t, work.new, work.stages[s], work.gradient)
+    if not speed * side > 0.0 or may_jump(model, run, transition, t, work.new, work):
+        return False
+    value = guard_value(model, transition, t, work.new, work.scalar)
+    return abs(value) <= rounding_band(model, run, transition, t, work.new, work)
+
+
+@njit(**KERNEL)
+def land(task, transition, side, h, theta):
+    """Shorten the step so that it ends on the guard, with the end in ``work.new``.
+
+    The step is taken again up to the root of the interpolant and corrected by Newton's method on the guard,
+    so that the state and the tangents at the event carry the error of the method, not that of its
+    interpolant. The guard comes from ``side``; Newton is kept in a bracket as soon as both sides have been
+    seen. Returns the length of the step last taken and the small Euler step that completed it; ``NOT_THERE``
+    instead of the length if the guard of the step, unlike that of its interpolant, only comes close to zero.
+    """
+    _, model, method, run, _, work = task_of(task)
+    t, s, rounding = run.phase, method.b.shape[0], measured_time(model, run, run.mode)
+    begins = guard_value(model, transition, t, run.y, work.scalar) * side > 0.0
+    # Along the step an affine guard is as smooth as the state. Other guards may have kinks, jumps and flat
+    # roots, and may cross more than once on the step. The ends of the step are then no bracket.
+    smooth = model.affine_guard[transition] == 1
+    after = smooth and guard_value(model, transition, t + h, work.new, work.scalar) * side <= 0.0
+    bracket = Lengths(0.0, h, smooth and begins, after)
+    length, last, reach = theta * h, math.inf, FIRST_REACH * h
+    for trial in range(MOST_LANDINGS):
+        attempt_again(task, length)
+        if length == 0.0:
+            return 0.0, 0.0
+        value = guard_value(model, transition, t + length, work.new, work.scalar)
+        speed = guard_speed(model, transition, t + length, work.new, work.stages[s], work.gradient)
+        correction = -value / speed
+        # The next correction is predicted from the last two, because Newton's method converges quadratically.
+        converges = smooth or (trial > 0 and abs(correction) ** 3 <= EPSILON * length * last * last)
+        if speed * side < 0.0 and abs(correction) <= EULER_IS_ENOUGH * length and converges:
+            for i in range(model.dimension * (1 + task.tangents)):
+                work.new[i] += correction * work.stages[s, i]
+            return length, correction
+        # A guard that stays zero for a while changes its side at the end of that.
+        at_rest = not smooth and value == 0.0 and speed == 0.0
+        # A guard without a value has not crossed yet if the interpolant crosses farther on.
+        short = value * side > 0.0 or at_rest or (math.isnan(value) and length < theta * h)
+        bracket = narrowed(bracket, length, short)
+        low, high, closed = bracket.low, bracket.high, bracket.before and bracket.after
+        if closed and high - low <= 2.0 * EPSILON * (max(high, rounding) if smooth else high):
+            if length != high:
+                attempt_again(task, high)
+            return (NOT_THERE if turns_back(model, run, transition, side, t + high, s, work) else high), 0.0
+        newton = length + correction
+        slow = trial >= MOST_LANDINGS // 2 if smooth else trial > 2 and not abs(correction) <= 0.5 * last
+        # A place that does not come from Newton's method gives no rate of convergence.
+        last = 0.0
+        # A Newton step longer than the error of the interpolant follows another slope, that beside a jump.
+        trusted = smooth or abs(correction) <= FARTHEST * h
+        if low < newton < high and trusted and not slow:
+            length, last = newton, abs(correction)
+        elif closed:
+            length = 0.5 * (low + high)
+        elif smooth:
+            break
+        else:
+            # Only one side is known: search the other side at growing distances.
+            length, bracket = searched_at(bracket, begins, reach, h)
+            reach *= 8.0
+            if length == NOT_THERE:
+                break
+    return NOT_THERE, 0.0
+
+
+@njit(**KERNEL)
+def sign_at_end(model, run, transition, t, work):
+    """The sign of a guard at the end of the attempted step, at ``t``; 0 if rounding hides it."""
+    value = guard_value(model, transition, t, work.new, work.scalar)
+    model.guard_gradient(transition, t, work.new, model.parameters, work.gradient)
+    if abs(value) <= rounding_band(model, run, transition, t, work.new, work):
+        return 0
+    return 1 if value > 0.0 else -1
+
+
+@njit(**KERNEL)
+def passed_before(model, run, fired, t, work):
+    """A transition whose guard a landing on the guard of ``fired``, at ``t``, lies beyond; or none.
+
+    The guard has a crossing on the step that fires, and is on one side up to that crossing.
+    """
+    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
+        transition = model.outgoing[slot]
+        side = run.rehearsal[3, transition]
+        # Where no crossing fires, the side is already that at the end of the step.
+        fires = side != 0 and side == run.side[transition] and run.passed[transition] == NO_ROOT
+        if transition != fired and fires and sign_at_end(model, run, transition, t, work) == -side:
+            return transition
+    return NO_TRANSITION
+
+
+@njit(**KERNEL)
+def land_on_first(task, fired, h, theta):
+    """Land on the guard of ``fired``, or on one that the landing shows to be crossed before.
+
+    The error of the interpolant may put guards that cross almost together in the wrong order. Returns the
+    lengths as ``land`` does, and the transition.
+    """
+    _, model, _, run, _, work = task_of(task)
+    mode = run.mode
+    length, correction = land(task, fired, run.rehearsal[3, fired], h, theta)
+    for _ in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+        if not length > 0.0:
+            break
+        other = passed_before(model, run, fired, run.phase + length + correction, work)
+        if other == NO_TRANSITION:
+            break
+        end = length
+        length, correction = land(task, other, run.rehearsal[3, other], end, 1.0)
+        if length == NOT_THERE:
+            # The guard only comes close to zero: the landing before stands.
+            length, correction = land(task, fired, run.rehearsal[3, fired], end, 1.0)
+            break
+        fired = other
+    return length, correction, fired
