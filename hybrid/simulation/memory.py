@@ -152,9 +152,7 @@ def starts_of(memory: Memory, origins: np.ndarray, queue: np.ndarray, **others: 
 
 
 @lru_cache(MOST_LAYOUTS)
-def work_layout(
-    method: Any, dimension: int, tangents: int, guards: int, columns: int, rows: int
-) -> Any:
+def work_layout(method: Any, dimension: int, tangents: int, guards: int, columns: int, rows: int) -> Any:
     """Where the arrays of a workspace lie.
 
     A mode has at most so many ``guards``; ``columns`` are those of series, ``rows`` those of programs.
