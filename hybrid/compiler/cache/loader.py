@@ -141,12 +141,23 @@ def _without_collection() -> Iterator[None]:
 
 @cache
 def import_numba() -> None:
-    """Import numba, for the processor that the kernels are compiled for."""
-    if os.environ.get("HYBRID_CPU"):
-        os.environ["NUMBA_CPU_NAME"], os.environ["NUMBA_CPU_FEATURES"] = cpu()
-    from hybrid.kernels.types.numba_door.session import import_array_functions
+    """Import numba, for the processor that the kernels are compiled for.
+
+    Raises
+    ------
+    RuntimeError
+        If numba has compiled for another one in this process: its target is made once.
+    """
+    from hybrid.kernels.types.numba_door.session import choose_processor, import_array_functions
 
     import_array_functions()
+    if os.environ.get("HYBRID_CPU") and not choose_processor(*cpu()):
+        raise RuntimeError(
+            "HYBRID_CPU: got "
+            f"{os.environ['HYBRID_CPU']!r}, but numba has compiled functions for this machine's processor in "
+            "this process, and compiles for one processor only. Compile the kernels before, by "
+            "python -m hybrid compile, or without HYBRID_CPU."
+        )
 
 
 def _path(module: str) -> Path:

@@ -1,6 +1,8 @@
 """Numba in this process: how it is imported, and who is asked between two of its passes."""
 
+from numba.core import config
 from numba.core.event import Listener, install_listener
+from numba.core.registry import cpu_target
 
 # Numba's event at the begin and at the end of each of its passes.
 PASS = "numba:run_pass"
@@ -21,6 +23,15 @@ def import_array_functions():
     finally:
         linalg.ensure_blas = look
     vars(arraymath)["ensure_blas"] = look
+
+
+def choose_processor(name, features):
+    """Let numba compile for a processor; false if it has compiled for another one before."""
+    chosen = vars(config)
+    if name != chosen["CPU_NAME"] and "_toplevel_target_context" in vars(cpu_target):
+        return False
+    chosen["CPU_NAME"], chosen["CPU_FEATURES"] = name, features
+    return True
 
 
 class _Asking(Listener):
