@@ -29,11 +29,13 @@ class Growths(Structure, counters=("count",)):
     """Growth rates of ``R`` runs over a ``count`` of intervals; ``done (R,)`` of them are complete.
 
     The interval of a run that is under way ends after ``cycles (R,)`` whole periods and at ``phases (R,)`` of
-    the next; its length is in ``lengths (R,)``, and ``hits (R, T)`` are the jumps of each transition in it.
-    ``rates (R, M, k + 1 + T)`` has a row for each interval: the rates of ``k`` tangent vectors; the
-    other side of the sum rule, which is the integral of div f plus the log-determinants of the saltation
-    matrices; and the jumps of each transition, all per unit time. ``batches (R, B, k + 1 + T)`` and
+    the next; its length is in ``lengths (R,)``. ``rates (R, M, k + 1 + T)`` has a row for each interval: the
+    rates of ``k`` tangent vectors, and the other side of the sum rule, which is the integral of div f plus
+    the log-determinants of the saltation matrices, all per unit time. ``batches (R, B, k + 1 + T)`` and
     ``batch_states (R, 3)`` are those of ``lyapunov.batches``, over all intervals so far.
+
+    The jumps of each transition are counted for a run alone: so far they are ``hits (T,)`` in the interval
+    that is under way, and the last columns are their numbers per unit time. For runs together ``T`` is zero.
     """
 
     counters: INDICES
@@ -41,7 +43,7 @@ class Growths(Structure, counters=("count",)):
     cycles: INDICES
     phases: VECTOR
     lengths: VECTOR
-    hits: INDEX_MATRIX
+    hits: INDICES
     rates: CUBE
     batches: CUBE
     batch_states: INDEX_MATRIX
@@ -77,12 +79,13 @@ def maps_of(end: Any, interval: float, intervals: int, columns: int) -> Any:
 
 
 @lru_cache(MOST_LAYOUTS)
-def growths_layout(runs: int, columns: int, transitions: int) -> Layout:
-    """Where the arrays of ``Growths`` lie; ``columns`` are all of those of the rates."""
+def growths_layout(runs: int, tangents: int, counted: int) -> Layout:
+    """Where the arrays of ``Growths`` lie; jumps of so many transitions are ``counted``."""
+    columns = tangents + 1 + counted
     shapes = {
         "counters": (1,),
         **dict.fromkeys(("done", "cycles", "phases", "lengths"), (runs,)),
-        "hits": (runs, transitions),
+        "hits": (counted,),
         "rates": (runs, INTERVALS_AT_ONCE, columns),
         "batches": (runs, MAX_BATCHES, columns),
         "batch_states": (runs, 3),

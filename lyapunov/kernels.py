@@ -42,11 +42,12 @@ def later(period, cycle, phase, interval):
 
 @njit(**KERNEL)
 def advance_and_count(advance, parts, task, growths, max_steps):
-    """Advance the only run to the end of its interval and count its jumps. Returns its code."""
+    """Advance the only run to the end of its interval and count its jumps, if they are. Returns its code."""
     run, cycle, phase = task.run, growths.cycles[0], growths.phases[0]
-    code = advance(parts, task, cycle, phase, max_steps, run.jumps)
+    counted = growths.hits.shape[0] > 0
+    code = advance(parts, task, cycle, phase, max_steps, run.jumps if counted else UNLIMITED)
     while code == MAX_JUMPS:
-        growths.hits[0, run.pending] += 1
+        growths.hits[run.pending] += 1
         code = advance(parts, task, cycle, phase, max_steps, run.jumps + 1)
     return code
 
@@ -75,8 +76,8 @@ def begin_interval(task, growths, r):
     for c in range(task.tangents):
         run.growth[c] = 0.0
     run.divergence, run.log_determinant = 0.0, 0.0
-    for i in range(growths.hits.shape[1]):
-        growths.hits[r, i] = 0
+    for i in range(growths.hits.shape[0]):
+        growths.hits[i] = 0
     growths.cycles[r], growths.phases[r] = later(
         task.model.period, growths.cycles[r], growths.phases[r], growths.lengths[r]
     )
@@ -94,20 +95,16 @@ def end_interval(task, growths, r):
     for c in range(tangents):
         rates[c] = run.growth[c] / interval
     rates[tangents] = (run.divergence + run.log_determinant) / interval
-    for i in range(growths.hits.shape[1]):
-        rates[tangents + 1 + i] = growths.hits[r, i] / interval
+    for i in range(growths.hits.shape[0]):
+        rates[tangents + 1 + i] = growths.hits[i] / interval
     push(growths.batches[r], growths.batch_states[r], rates)
     growths.done[r] += 1
 
 
 @exported(INTEGER, Parts, Task, Crew, INTEGER, INTEGER)
 def growth_of_run(parts, task, crew, r, code):
-    """What a run does next whose growth rates are those of ``growth_rates`` (``ONWARD``)."""
-    growths, run = growths_at(crew.jobs[r]), task.run
-    if code == MAX_JUMPS:
-        growths.hits[r, run.pending] += 1
-        crew.max_jumps[r] = run.jumps + 1
-        return GO_ON
+    """What a run does next whose growth rates are wanted (``ONWARD``), as in ``growth_rates``."""
+    growths = growths_at(crew.jobs[r])
     if code == DONE:
         end_interval(task, growths, r)
         if growths.done[r] == growths.count:
@@ -116,7 +113,6 @@ def growth_of_run(parts, task, crew, r, code):
         return code
     begin_interval(task, growths, r)
     crew.cycles[r], crew.phases[r] = growths.cycles[r], growths.phases[r]
-    crew.max_jumps[r] = run.jumps
     return GO_ON
 
 

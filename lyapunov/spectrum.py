@@ -23,6 +23,7 @@ from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.display.tables import counted, html_table
 from hybrid.kernels.types import codes
+from hybrid.kernels.types.entries import COUNTERS
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names, attributes
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 
 # Rounding of the time may be at most this share of an interval.
 FINEST_INTERVAL = 2.0**-10
+JUMPS_AND_STEPS = [COUNTERS.index("jumps"), COUNTERS.index("steps")]
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -257,7 +259,7 @@ def lyapunov_spectrum(
     orthonormal_at_start(trajectory)
     length = interval_length(trajectory, interval, transient + intervals)
     load_kernels("lyapunov.kernels")
-    estimates = Estimates([Flight(trajectory, length)], k)
+    estimates = Estimates([Flight(trajectory, length)], k, len(trajectory.system.transitions))
     with trajectory.stop, progress_bar(transient + intervals, "Lyapunov spectrum", progress) as bar:
         means = estimates.means(transient, intervals, history, partial(estimates.alone, bar))
     system = original_of(trajectory.system)
@@ -333,17 +335,15 @@ class Estimates:
     """Advances runs of one plan and accumulates their growth rates, which a kernel returns in rounds.
 
     The trajectories carry a vector for each of the ``k`` exponents, or for all but the last of ``k = n``. The
-    ``codes (R,)`` tell how the runs have ended, or are DONE for those that are under way.
+    ``codes (R,)`` tell how the runs have ended, or are DONE for those that are under way. ``counted`` is the
+    number of transitions whose jumps are counted: none, or for a run alone all of them.
     """
 
-    def __init__(self, flights: Sequence[Flight], k: int) -> None:
+    def __init__(self, flights: Sequence[Flight], k: int, counted: int = 0) -> None:
         self.trajectories, lengths = zip(*flights, strict=True)
         self.k, self.first = k, self.trajectories[0]
         self.tasks = [each.task(each.no_record(), orthonormal=True) for each in self.trajectories]
-        transitions = len(self.first.system.transitions)
-        # Numbers per interval: growth rates, the other side of the sum rule, jumps of each transition.
-        self.columns = self.first.tangents + 1 + transitions
-        self.layout = growths_layout(len(flights), self.columns, transitions)
+        self.layout = growths_layout(len(flights), self.first.tangents, counted)
         growths = self.growths = self.layout.unwritten()
         growths.cycles[:] = [each.run.cycle for each in self.trajectories]
         growths.phases[:] = [each.run.phase for each in self.trajectories]
@@ -369,10 +369,13 @@ class Estimates:
                 pass
             growths.batch_states[:] = EMPTY
             for each in self.trajectories:
-                _replace_annihilated(each)
                 # A vector of which only rounding was left is by now a new direction, like those at the start.
                 each.run.indistinct, each.run.ill_conditioned_growth = 0, 0.0
-        mean, kept, before = TaperedMean((runs, self.columns)), [np.empty((runs, 0, k))], self._made()
+            vectors = np.array([each.run.y for each in self.trajectories])[:, self.first.model.dimension :]
+            for i in np.flatnonzero(~vectors.all(axis=1)):
+                _replace_annihilated(self.trajectories[i])
+        mean = TaperedMean((runs, growths.rates.shape[-1]))
+        kept, before = [np.empty((runs, 0, k))], self._made()
         for rates in self._rounds(intervals, go):
             mean.add(rates)
             self.counts += growths.done
@@ -403,7 +406,7 @@ class Estimates:
 
     def _made(self) -> np.ndarray:
         """The jumps and the steps of the runs so far ``(2, R)``."""
-        return np.array([[each.jumps, each.steps] for each in self.trajectories]).T
+        return np.array([each.run.counters for each in self.trajectories])[:, JUMPS_AND_STEPS].T
 
     def _rounds(self, intervals: int, go: Callable[[], None]) -> Iterator[np.ndarray]:
         """The rates ``(R, m, columns)`` of intervals, round by round; zero after the end of a run."""
@@ -472,10 +475,8 @@ def _replace_annihilated(trajectory: Trajectory) -> None:
     A direction that is annihilated again and again has the exponent minus infinity. Annihilation during the
     transient alone does not mean that.
     """
-    run, n = trajectory.run, trajectory.model.dimension
-    if run.y[n:].all():
-        return
-    vectors = run.y[n:].reshape(-1, n)[:, : trajectory.system.tangent_dimension]
+    n = trajectory.model.dimension
+    vectors = trajectory.run.y[n:].reshape(-1, n)[:, : trajectory.system.tangent_dimension]
     n = vectors.shape[1]
     gone = ~vectors.any(axis=1)
     if gone.any():

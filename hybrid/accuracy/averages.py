@@ -165,7 +165,7 @@ class TaperedMean:
     def __init__(self, shape: int | tuple[int, ...]) -> None:
         *stack, columns = (shape,) if isinstance(shape, int) else shape
         self.count = 0
-        self._moments = np.zeros((*stack, 3, columns))
+        self._moments = np.zeros((*stack, columns, 3))
         self._collapsed = np.zeros((*stack, columns), dtype=bool)
 
     def add(self, rows: Array) -> None:
@@ -176,8 +176,11 @@ class TaperedMean:
             rows = np.where(collapsed, 0.0, rows)
         place = np.arange(rows.shape[-2]) + (self.count + 0.5)
         square = place * place
-        # Three sums give the tapered mean, with these powers of the place in the series as weights.
-        self._moments += np.stack([square, square * place, square * square]) @ rows
+        # Three sums give the tapered mean, with these powers of the place in the series as weights. Each
+        # series is summed by itself, which is the same to the last bit whatever stands beside it.
+        weights = np.stack([square, square * place, square * square])
+        series = np.ascontiguousarray(np.swapaxes(rows, -2, -1))[..., None, :]
+        self._moments += (series @ weights.T)[..., 0, :]
         self.count += rows.shape[-2]
 
     def value(self, counts: NDArray[np.int64] | None = None) -> Array:
@@ -188,7 +191,7 @@ class TaperedMean:
         """
         size = np.array(self.count if counts is None else counts, dtype=float)[..., None]
         size[size == 0.0] = np.nan
-        return np.where(self._collapsed, -np.inf, _tapered(np.moveaxis(self._moments, -2, 0), size))
+        return np.where(self._collapsed, -np.inf, _tapered(np.moveaxis(self._moments, -1, 0), size))
 
 
 def running_tapered_mean(series: Array) -> Array:
