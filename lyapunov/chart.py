@@ -17,7 +17,7 @@ from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import silent
 from hybrid.errors import HybridError
 from hybrid.orbits.closing import advance_to_close
-from hybrid.simulation.trajectory import Trajectory
+from hybrid.simulation.trajectory import Common, Trajectory
 from hybrid.solvers import Solver
 from hybrid.status import Status
 from hybrid.sweep.rows import At, Place, Rows, rows_of
@@ -173,9 +173,8 @@ class Exponents:
                 result_of(partial(self.rows.grown, partial(self._row, point=point, place=place)))
                 for point, place in zip(points, places, strict=True)
             ]
-        begun = [
-            result_of(partial(self._begun, self.rows, *each)) for each in zip(points, places, strict=True)
-        ]
+        begin = partial(self._begun, self.rows, self._common(self.rows))
+        begun = [result_of(partial(begin, *each)) for each in zip(points, places, strict=True)]
         found: list[Any] = list(begun)
         for runs in alike(begun):
             estimates = Estimates([found[i] for i in runs], self.k)
@@ -188,14 +187,17 @@ class Exponents:
         return found
 
     def _row(self, rows: Rows, point: Mapping[str, float], place: Place | None) -> dict[str, Any]:
-        estimates = Estimates([self._begun(rows, point, place)], self.k)
+        estimates = Estimates([self._begun(rows, self._common(rows), point, place)], self.k)
         means = estimates.means(self.transient, self.intervals, False, partial(estimates.alone, silent()))
         found = self._results(rows, point, estimates, means, 0)
         estimates.release()
         return found
 
-    def _begun(self, rows: Rows, point: Mapping[str, float], place: Place | None) -> Flight:
-        trajectory = rows.begin(point, place, self._vectors, rows.system)
+    def _common(self, rows: Rows) -> Common:
+        return rows.common(rows.system, self._vectors, rows.t0)
+
+    def _begun(self, rows: Rows, common: Common, point: Mapping[str, float], place: Place | None) -> Flight:
+        trajectory = rows.begin(point, place, common)
         orthonormal_at_start(trajectory)
         return Flight(trajectory, self._length(trajectory))
 
@@ -220,7 +222,7 @@ class Exponents:
         return self.rows.grown(lambda rows: self._carried(rows, point, place))
 
     def _carried(self, rows: Rows, point: Mapping[str, float], place: Place | None) -> Place | None:
-        trajectory = rows.begin(point, place, None, rows.system)
+        trajectory = rows.begin(point, place, rows.common(rows.system, None, rows.t0))
         span = self.transient * self._length(trajectory)
         period, clock = trajectory.model.period, trajectory.run
         cycles = math.ceil(span / period * (1 - 1e-12)) if period else 0
@@ -280,7 +282,7 @@ class Exponents:
             place, now = (trajectory.x, trajectory.mode), float(trajectory.run.phase)
             system = rows.marked if trajectory.system.age is None else aged(rows.marked)
             try:
-                marked = rows.go_on(point, place, None, system, now)
+                marked = rows.go_on(point, place, rows.common(system, None, now))
             except HybridError:
                 return np.full((self.points, rows.system.dimension), np.nan)
             marked.goes_on_from(trajectory)

@@ -371,8 +371,7 @@ class Estimates:
             for each in self.trajectories:
                 # A vector of which only rounding was left is by now a new direction, like those at the start.
                 each.run.indistinct, each.run.ill_conditioned_growth = 0, 0.0
-            vectors = np.array([each.run.y for each in self.trajectories])[:, self.first.model.dimension :]
-            for i in np.flatnonzero(~vectors.all(axis=1)):
+            for i in np.flatnonzero(~self._stacked("y")[:, self.first.model.dimension :].all(axis=1)):
                 _replace_annihilated(self.trajectories[i])
         mean = TaperedMean((runs, growths.rates.shape[-1]))
         kept, before = [np.empty((runs, 0, k))], self._made()
@@ -404,9 +403,13 @@ class Estimates:
         means = closed_batch_means(growths.batches, growths.batch_states[places[0]])
         return self._completed(means[places])
 
+    def _stacked(self, name: str) -> np.ndarray:
+        """An array of each run ``(R, ...)``."""
+        return np.array([getattr(each.run, name) for each in self.trajectories])
+
     def _made(self) -> np.ndarray:
         """The jumps and the steps of the runs so far ``(2, R)``."""
-        return np.array([each.run.counters for each in self.trajectories])[:, JUMPS_AND_STEPS].T
+        return self._stacked("counters")[:, JUMPS_AND_STEPS].T
 
     def _rounds(self, intervals: int, go: Callable[[], None]) -> Iterator[np.ndarray]:
         """The rates ``(R, m, columns)`` of intervals, round by round; zero after the end of a run."""
