@@ -54,12 +54,13 @@ def attributes_of(task: Callable[..., Any]) -> dict[str, Any]:
     """Attributes of a dataset that say what made it, the parameters and versions included."""
     facts = facts_of(task)
     made_by = {"task": facts["task"], "task_hash": _hash(json.dumps(facts))}
-    system = model_of(task)
+    system, given = model_of(task), getattr(task, "facts", None) or {}
     if system is not None:
+        # The text of a model takes long to write, and the model is often one of the facts.
+        text = facts["model"] if given.get("model") is system else _described(system, set())
         made_by["model"] = system.name or "unnamed"
-        made_by["model_hash"] = _hash(_described(system, set()))
+        made_by["model_hash"] = _hash(text)
         made_by["model_parameters"] = json.dumps(dict(system.parameters))
-    given = getattr(task, "facts", None) or {}
     made_by |= {
         name: value if isinstance(value, str | int | float) else json.dumps(value, default=repr)
         for name, value in given.items()
