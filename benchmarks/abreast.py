@@ -19,7 +19,7 @@ from hybrid import Taylor, simulate, simulate_many
 from hybrid.simulation.trajectory import start as begin
 from lyapunov import lyapunov_spectrum
 from lyapunov.directions import first_vectors
-from lyapunov.spectrum import Estimate
+from lyapunov.spectrum import Estimates, Flight
 from lyapunov.together import means_together
 
 ROWS = 480
@@ -50,10 +50,9 @@ def rows(system: Any, start: tuple[float, ...], k: int, intervals: int) -> Any:
     vectors, length, runs = first_vectors(system, k, None), system.forcing_period(), []
     for _ in range(ROWS):
         runs.append(begin(system, start, 0.0, mode="free", tangent=vectors))
-    estimates = [Estimate(run, length, k) for run in runs]
+    estimates = Estimates([Flight(run, length) for run in runs], k)
     found = means_together(estimates, 0, intervals)
-    for each in estimates:
-        each.release()
+    estimates.release()
     return found
 
 

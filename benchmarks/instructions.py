@@ -55,7 +55,7 @@ from hybrid import simulate, simulate_many
 from hybrid.simulation.trajectory import start
 from lyapunov import lyapunov_spectrum
 from lyapunov.directions import first_vectors
-from lyapunov.spectrum import Estimate
+from lyapunov.spectrum import Estimates, Flight
 from lyapunov.together import means_together
 START = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
 system = models.vibroimpact()
@@ -63,7 +63,7 @@ T = system.forcing_period()
 
 def rows():
     runs = [start(system, START, 0.0, mode="free", tangent=first_vectors(system, 1, None)) for _ in range(24)]
-    return [Estimate(run, T, 1) for run in runs]
+    return Estimates([Flight(run, T) for run in runs], 1)
 
 for run, *lengths, _ in {[*RUNS.values()]!r}:
     for M in (1, *lengths):

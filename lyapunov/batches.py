@@ -41,5 +41,5 @@ def push(batch_sums: Array, state: NDArray[np.int64], values: Array) -> None:
 
 
 def closed_batch_means(batch_sums: Array, state: NDArray[np.int64]) -> Array:
-    """Means ``(b, k)`` of the closed batches of an accumulator, without the open batch."""
-    return batch_sums[: state[CLOSED]] / state[BATCH_SIZE]
+    """Means ``(..., b, k)`` of the closed batches of accumulators in one state, without the open batch."""
+    return batch_sums[..., : state[CLOSED], :] / state[BATCH_SIZE]

@@ -17,13 +17,14 @@ from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import silent
 from hybrid.errors import HybridError
 from hybrid.orbits.closing import advance_to_close
-from hybrid.simulation.trajectory import Trajectory
+from hybrid.simulation.trajectory import Common, Trajectory
 from hybrid.solvers import Solver
+from hybrid.status import Status
 from hybrid.sweep.rows import At, Place, Rows, rows_of
 from hybrid.sweep.sheet import Labels
-from hybrid.transform.aged import aged
+from hybrid.transform.aged import aged, without_age
 from lyapunov.directions import first_vectors, number_of_exponents
-from lyapunov.spectrum import Estimate, Means, interval_length, orthonormal_at_start
+from lyapunov.spectrum import Estimates, Flight, Means, interval_length, orthonormal_at_start
 from lyapunov.together import alike, means_together, result_of
 
 if TYPE_CHECKING:
@@ -172,52 +173,56 @@ class Exponents:
                 result_of(partial(self.rows.grown, partial(self._row, point=point, place=place)))
                 for point, place in zip(points, places, strict=True)
             ]
-        begun = [
-            result_of(partial(self._begun, self.rows, *each)) for each in zip(points, places, strict=True)
-        ]
+        begin = partial(self._begun, self.rows, self._common(self.rows))
+        begun = [result_of(partial(begin, *each)) for each in zip(points, places, strict=True)]
         found: list[Any] = list(begun)
-        for estimates in alike(begun):
-            means = means_together([*estimates.values()], self.transient, self.intervals)
-            for (i, estimate), each in zip(estimates.items(), means, strict=True):
-                found[i] = each
-                if not isinstance(each, Exception):
-                    found[i] = result_of(partial(self._results, self.rows, points[i], estimate, each))
+        for runs in alike(begun):
+            estimates = Estimates([found[i] for i in runs], self.k)
+            means = result_of(partial(means_together, estimates, self.transient, self.intervals))
+            for row, i in enumerate(runs):
+                found[i] = means
+                if not isinstance(means, Exception):
+                    found[i] = result_of(partial(self._results, self.rows, points[i], estimates, means, row))
+            estimates.release()
         return found
 
     def _row(self, rows: Rows, point: Mapping[str, float], place: Place | None) -> dict[str, Any]:
-        estimate = self._begun(rows, point, place)
-        means = estimate.run(self.transient, self.intervals, False, silent())
-        return self._results(rows, point, estimate, means)
+        estimates = Estimates([self._begun(rows, self._common(rows), point, place)], self.k)
+        means = estimates.means(self.transient, self.intervals, False, partial(estimates.alone, silent()))
+        found = self._results(rows, point, estimates, means, 0)
+        estimates.release()
+        return found
 
-    def _begun(self, rows: Rows, point: Mapping[str, float], place: Place | None) -> Estimate:
-        trajectory = rows.begin(point, place, self._vectors, rows.system)
+    def _common(self, rows: Rows) -> Common:
+        return rows.common(rows.system, self._vectors, rows.t0)
+
+    def _begun(self, rows: Rows, common: Common, point: Mapping[str, float], place: Place | None) -> Flight:
+        trajectory = rows.begin(point, place, common)
         orthonormal_at_start(trajectory)
-        return Estimate(trajectory, self._length(trajectory), self.k)
+        return Flight(trajectory, self._length(trajectory))
 
     def _results(
-        self, rows: Rows, point: Mapping[str, float], estimate: Estimate, means: Means
+        self, rows: Rows, point: Mapping[str, float], estimates: Estimates, means: Means, row: int
     ) -> dict[str, Any]:
-        trajectory = estimate.trajectory
-        found = {
-            "exponents": means.exponents,
-            "standard_error": means.standard_error,
-            "sum_rule": means.sum_rule,
-            "jumps_per_interval": means.jumps_per_interval,
-            "x_end": means.x,
-            "mode_end": means.mode,
+        trajectory, status = estimates.trajectories[row], estimates.status(row)
+        return {
+            "exponents": means.exponents[row],
+            "standard_error": means.standard_error[row],
+            "sum_rule": means.sum_rule[row],
+            "jumps_per_interval": means.jumps_per_interval[row],
+            "x_end": without_age(rows.system, trajectory.x),
+            "mode_end": trajectory.mode,
             # An axis of length zero could not be read back from a file.
-            **({"section": self._section(rows, point, trajectory, means)} if self.points else {}),
-            "status": means.status,
+            **({"section": self._section(rows, point, trajectory, status)} if self.points else {}),
+            "status": status,
         }
-        estimate.release()
-        return found
 
     def carry(self, point: Mapping[str, float], place: Place | None) -> Place | None:
         """State and mode after the transient, rounded up to whole forcing periods to keep the phase."""
         return self.rows.grown(lambda rows: self._carried(rows, point, place))
 
     def _carried(self, rows: Rows, point: Mapping[str, float], place: Place | None) -> Place | None:
-        trajectory = rows.begin(point, place, None, rows.system)
+        trajectory = rows.begin(point, place, rows.common(rows.system, None, rows.t0))
         span = self.transient * self._length(trajectory)
         period, clock = trajectory.model.period, trajectory.run
         cycles = math.ceil(span / period * (1 - 1e-12)) if period else 0
@@ -268,16 +273,16 @@ class Exponents:
         return interval_length(trajectory, self.interval, self.transient + self.intervals)
 
     def _section(
-        self, rows: Rows, point: Mapping[str, float], trajectory: Trajectory, means: Means
+        self, rows: Rows, point: Mapping[str, float], trajectory: Trajectory, status: Status
     ) -> np.ndarray:
-        if not self.points or not means.status.ok:
+        if not status.ok:
             return np.full((self.points, rows.system.dimension), np.nan)
         if rows.marked is not rows.system:
             # The system with the surface goes on from here; with a period the phase is all of the time.
-            place, now = (trajectory.x, means.mode), float(trajectory.run.phase)
+            place, now = (trajectory.x, trajectory.mode), float(trajectory.run.phase)
             system = rows.marked if trajectory.system.age is None else aged(rows.marked)
             try:
-                marked = rows.go_on(point, place, None, system, now)
+                marked = rows.go_on(point, place, rows.common(system, None, now))
             except HybridError:
                 return np.full((self.points, rows.system.dimension), np.nan)
             marked.goes_on_from(trajectory)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,18 +20,11 @@ from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
 from hybrid.transform.aged import aged, least_dimension
 from lyapunov.interval import end_at, maps_of
-from lyapunov.spectrum import interval_length
+from lyapunov.spectrum import Flight, interval_length
 
 # By how much two sums of logarithms may differ that are the same but for the error of a run.
 SAME = 1e-9
 STARTS = "be a state (n,) or states of shape (N, n)"
-
-
-class Flight(NamedTuple):
-    """A run at its start, and the length of its intervals."""
-
-    trajectory: Trajectory
-    length: float
 
 
 @growing

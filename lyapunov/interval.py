@@ -1,13 +1,18 @@
 """The end of an interval of time and what has been summed up to there, as kernels and Python see them."""
 
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from hybrid.accuracy.averages import MAX_BATCHES
-from hybrid.kernels.types.kinds import INDICES, MATRIX, REAL, VECTOR
+from hybrid.kernels.types.kinds import CUBE, INDEX_MATRIX, INDICES, MATRIX, REAL, VECTOR
 from hybrid.kernels.types.structure import Layout, Structure
+from hybrid.simulation.memory import MOST_LAYOUTS
+
+# Intervals in a round. Means are summed by rounds, so that their rounding does not depend on where a burst of
+# a kernel ends.
+INTERVALS_AT_ONCE = 1000
 
 
 class End(Structure, counters=("cycle", "done"), numbers=("phase",)):
@@ -20,28 +25,28 @@ class End(Structure, counters=("cycle", "done"), numbers=("phase",)):
     numbers: VECTOR
 
 
-class Sums(Structure):
-    """``hits (T,)``: jumps of each transition in the interval that is under way; sums over those before.
+class Growths(Structure, counters=("count",)):
+    """Growth rates of ``R`` runs over a ``count`` of intervals; ``done (R,)`` of them are complete.
 
-    ``batches (B, k + 1 + T)`` and ``batch_state (3,)`` are those of ``lyapunov.batches``.
-    """
+    The interval of a run that is under way ends after ``cycles (R,)`` whole periods and at ``phases (R,)`` of
+    the next; its length is in ``lengths (R,)``. ``rates (R, M, k + 1 + T)`` has a row for each interval: the
+    rates of ``k`` tangent vectors, and the other side of the sum rule, which is the integral of div f plus
+    the log-determinants of the saltation matrices, all per unit time. ``batches (R, B, k + 1 + T)`` and
+    ``batch_states (R, 3)`` are those of ``lyapunov.batches``, over all intervals so far.
 
-    hits: INDICES
-    batches: MATRIX
-    batch_state: INDICES
-
-
-class Growth(Structure, counters=("done", "count")):
-    """The intervals of one run among others: so many are ``done`` of a ``count``.
-
-    ``rates (M, k + 1 + T)`` are those of ``lyapunov.kernels.growth_rates``.
+    The jumps of each transition are counted for a run alone: so far they are ``hits (T,)`` in the interval
+    that is under way, and the last columns are their numbers per unit time. For runs together ``T`` is zero.
     """
 
     counters: INDICES
-    end: End
-    sums: Sums
-    interval: REAL
-    rates: MATRIX
+    done: INDICES
+    cycles: INDICES
+    phases: VECTOR
+    lengths: VECTOR
+    hits: INDICES
+    rates: CUBE
+    batches: CUBE
+    batch_states: INDEX_MATRIX
 
 
 class Maps(Structure, counters=("done", "count")):
@@ -67,26 +72,22 @@ def end_at(run: Any) -> Any:
     return end
 
 
-def growth_of(end: Any, sums: Any, interval: float, intervals: int, columns: int) -> Any:
-    """A ``Growth`` with room for so many intervals."""
-    return Growth(
-        counters=np.zeros(2, dtype=np.int64),
-        end=end,
-        sums=sums,
-        interval=interval,
-        rates=np.zeros((intervals, columns)),
-    )
-
-
 def maps_of(end: Any, interval: float, intervals: int, columns: int) -> Any:
     """The ``Maps`` of so many intervals."""
     counters = np.array([0, intervals], dtype=np.int64)
     return Maps(counters=counters, end=end, interval=interval, maps=np.full((intervals, columns), np.nan))
 
 
-@cache
-def sums_layout(tangents: int, transitions: int) -> Any:
-    """Where the arrays of ``Sums`` lie."""
-    columns = tangents + 1 + transitions
-    shapes = {"hits": (transitions,), "batches": (MAX_BATCHES, columns), "batch_state": (3,)}
-    return Layout(Sums, shapes)
+@lru_cache(MOST_LAYOUTS)
+def growths_layout(runs: int, tangents: int, counted: int) -> Layout:
+    """Where the arrays of ``Growths`` lie; jumps of so many transitions are ``counted``."""
+    columns = tangents + 1 + counted
+    shapes = {
+        "counters": (1,),
+        **dict.fromkeys(("done", "cycles", "phases", "lengths"), (runs,)),
+        "hits": (counted,),
+        "rates": (runs, INTERVALS_AT_ONCE, columns),
+        "batches": (runs, MAX_BATCHES, columns),
+        "batch_states": (runs, 3),
+    }
+    return Layout(Growths, shapes)

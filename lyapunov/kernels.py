@@ -20,12 +20,12 @@ from hybrid.kernels.types.layout import ADVANCE, Parts, Task
 from hybrid.kernels.types.numba_door.addressed import structure_at
 from hybrid.kernels.types.options import KERNEL, exported
 from lyapunov import batches
-from lyapunov.interval import End, Growth, Maps, Sums
+from lyapunov.interval import End, Growths, Maps
 
 UNLIMITED = 9223372036854775807
 
 push = njit(**KERNEL)(batches.push)
-growth_at, maps_at = structure_at(Growth), structure_at(Maps)
+growths_at, maps_at = structure_at(Growths), structure_at(Maps)
 
 
 @njit(**KERNEL)
@@ -41,84 +41,78 @@ def later(period, cycle, phase, interval):
 
 
 @njit(**KERNEL)
-def advance_and_count(advance, parts, task, cycle, phase, max_steps, hits):
-    """Advance a run; the jumps that it makes are counted in ``hits (transitions,)``. Returns its code."""
-    run = task.run
-    code = advance(parts, task, cycle, phase, max_steps, run.jumps)
+def advance_and_count(advance, parts, task, growths, max_steps):
+    """Advance the only run to the end of its interval and count its jumps, if they are. Returns its code."""
+    run, cycle, phase = task.run, growths.cycles[0], growths.phases[0]
+    counted = growths.hits.shape[0] > 0
+    code = advance(parts, task, cycle, phase, max_steps, run.jumps if counted else UNLIMITED)
     while code == MAX_JUMPS:
-        hits[run.pending] += 1
+        growths.hits[run.pending] += 1
         code = advance(parts, task, cycle, phase, max_steps, run.jumps + 1)
     return code
 
 
-@exported(INTEGER, ADVANCE, Parts, Task, End, Sums, REAL, INTEGER, TRUTH, MATRIX)
-def growth_rates(advance, parts, task, end, sums, interval, max_steps, resumed, rates):
-    """Growth rates ``(M, k + 1 + T)`` of ``k`` tangent vectors over ``M`` intervals (Benettin et al. 1980).
+@exported(INTEGER, ADVANCE, Parts, Task, Growths, INTEGER, TRUTH)
+def growth_rates(advance, parts, task, growths, max_steps, resumed):
+    """Growth rates of the tangent vectors of one run (Benettin et al. 1980). Returns the driver's code.
 
-    The column after them is the other side of the sum rule: the integral of div f plus the log-determinants
-    of the saltation matrices, per unit time. The last columns are the jumps of each transition per unit time.
-    ``end`` is the end of the last interval. Each row is also added to the batches of ``sums``. Returns the
-    driver's code; ``end.done`` is how many intervals were completed. After ``MAX_STEPS`` the next call
-    resumes the interval that was not completed: ``resumed``.
+    After ``MAX_STEPS`` the next call resumes the interval that was not completed: ``resumed``.
     """
-    for done in range(rates.shape[0]):
-        end.done = done
-        if done > 0 or not resumed:
-            begin_interval(task, end, sums, interval)
-        code = advance_and_count(advance, parts, task, end.cycle, end.phase, max_steps, sums.hits)
+    while growths.done[0] < growths.count:
+        if not resumed:
+            begin_interval(task, growths, 0)
+        resumed = False
+        code = advance_and_count(advance, parts, task, growths, max_steps)
         if code != DONE:
             return code
-        end_interval(task, sums, interval, rates[done])
-    end.done = rates.shape[0]
+        end_interval(task, growths, 0)
     return DONE
 
 
 @njit(**KERNEL)
-def begin_interval(task, end, sums, interval):
-    """Begin an interval: ``end`` becomes its end."""
+def begin_interval(task, growths, r):
+    """Begin an interval of run ``r``."""
     run = task.run
     for c in range(task.tangents):
         run.growth[c] = 0.0
     run.divergence, run.log_determinant = 0.0, 0.0
-    for i in range(sums.hits.shape[0]):
-        sums.hits[i] = 0
-    end.cycle, end.phase = later(task.model.period, end.cycle, end.phase, interval)
+    for i in range(growths.hits.shape[0]):
+        growths.hits[i] = 0
+    growths.cycles[r], growths.phases[r] = later(
+        task.model.period, growths.cycles[r], growths.phases[r], growths.lengths[r]
+    )
 
 
 @njit(**KERNEL)
-def end_interval(task, sums, interval, rates):
-    """End an interval: its growth rates into ``rates (k + 1 + T,)``, and into the batches."""
-    run, n, tangents, hits = task.run, task.model.dimension, task.tangents, sums.hits
+def end_interval(task, growths, r):
+    """End an interval of run ``r``: its growth rates are the next row, and go into the batches."""
+    run, n, tangents = task.run, task.model.dimension, task.tangents
     run.indistinct += orthonormalise(run.y, n, tangents, run.growth, task.work.jacobian, False, 0)
     run.strain = 0.0
     if run.stage == READY:
         run.stage = STALE
+    rates, interval = growths.rates[r, growths.done[r]], growths.lengths[r]
     for c in range(tangents):
         rates[c] = run.growth[c] / interval
     rates[tangents] = (run.divergence + run.log_determinant) / interval
-    for i in range(hits.shape[0]):
-        rates[tangents + 1 + i] = hits[i] / interval
-    push(sums.batches, sums.batch_state, rates)
+    for i in range(growths.hits.shape[0]):
+        rates[tangents + 1 + i] = growths.hits[i] / interval
+    push(growths.batches[r], growths.batch_states[r], rates)
+    growths.done[r] += 1
 
 
 @exported(INTEGER, Parts, Task, Crew, INTEGER, INTEGER)
 def growth_of_run(parts, task, crew, r, code):
-    """What a run does next whose growth rates are those of ``growth_rates`` (``ONWARD``)."""
-    growth, run = growth_at(crew.jobs[r]), task.run
-    if code == MAX_JUMPS:
-        growth.sums.hits[run.pending] += 1
-        crew.max_jumps[r] = run.jumps + 1
-        return GO_ON
+    """What a run does next whose growth rates are wanted (``ONWARD``), as in ``growth_rates``."""
+    growths = growths_at(crew.jobs[r])
     if code == DONE:
-        end_interval(task, growth.sums, growth.interval, growth.rates[growth.done])
-        growth.done += 1
-        if growth.done == growth.count:
+        end_interval(task, growths, r)
+        if growths.done[r] == growths.count:
             return DONE
     elif code != GO_ON:
         return code
-    begin_interval(task, growth.end, growth.sums, growth.interval)
-    crew.cycles[r], crew.phases[r] = growth.end.cycle, growth.end.phase
-    crew.max_jumps[r] = run.jumps
+    begin_interval(task, growths, r)
+    crew.cycles[r], crew.phases[r] = growths.cycles[r], growths.phases[r]
     return GO_ON
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,6 +23,7 @@ from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.display.tables import counted, html_table
 from hybrid.kernels.types import codes
+from hybrid.kernels.types.entries import COUNTERS
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names, attributes
@@ -33,7 +35,7 @@ from hybrid.system.growth import growing
 from hybrid.transform.aged import least_dimension, original_of, without_age
 from lyapunov.batches import EMPTY, closed_batch_means
 from lyapunov.directions import first_vectors, generic_directions, number_of_exponents
-from lyapunov.interval import END, end_at, sums_layout
+from lyapunov.interval import INTERVALS_AT_ONCE, growths_layout
 from lyapunov.per_transition import JumpRates, PerTransition
 
 if TYPE_CHECKING:
@@ -41,8 +43,7 @@ if TYPE_CHECKING:
 
 # Rounding of the time may be at most this share of an interval.
 FINEST_INTERVAL = 2.0**-10
-# Intervals per call of the kernel: few enough for a progress bar and an interrupt.
-INTERVALS_AT_ONCE = 250
+JUMPS_AND_STEPS = [COUNTERS.index("jumps"), COUNTERS.index("steps")]
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -258,11 +259,23 @@ def lyapunov_spectrum(
     orthonormal_at_start(trajectory)
     length = interval_length(trajectory, interval, transient + intervals)
     load_kernels("lyapunov.kernels")
-    estimate = Estimate(trajectory, length, k)
+    estimates = Estimates([Flight(trajectory, length)], k, len(trajectory.system.transitions))
     with trajectory.stop, progress_bar(transient + intervals, "Lyapunov spectrum", progress) as bar:
-        found = estimate.spectrum(transient, intervals, history, bar)
-    estimate.release()
-    return found
+        means = estimates.means(transient, intervals, history, partial(estimates.alone, bar))
+    system = original_of(trajectory.system)
+    found: dict[str, Any] = {name: each[0] for name, each in means._asdict().items()}
+    jump_rates = JumpRates.of(system, k, found.pop("values"), *estimates.batches([0]))
+    spectrum = LyapunovSpectrum(
+        **found,
+        interval=length,
+        mode=trajectory.mode,
+        x=without_age(system, trajectory.x),
+        status=estimates.status(0),
+        names=Names(system.state_names, dict(system.units)),
+        jump_rates=jump_rates,
+    )
+    estimates.release()
+    return spectrum
 
 
 def orthonormal_at_start(trajectory: Trajectory) -> None:
@@ -295,148 +308,150 @@ def interval_length(trajectory: Trajectory, interval: float | None, intervals: i
     return length
 
 
-class Means(NamedTuple):
-    """What is found of an orbit over ``intervals`` intervals, as in a `LyapunovSpectrum`.
+class Flight(NamedTuple):
+    """A run at its start, and the length of its intervals."""
 
-    ``values`` are the means of all columns of the growth rates, ``batches`` those of batches.
+    trajectory: Trajectory
+    length: float
+
+
+class Means(NamedTuple):
+    """What is found of several orbits, each over so many ``intervals``, as in a `LyapunovSpectrum`.
+
+    ``values`` are the means of all columns of the growth rates.
     """
 
     exponents: np.ndarray
     standard_error: np.ndarray
-    sum_rule: float
-    growths: np.ndarray
-    intervals: int
-    jumps_per_interval: float
-    steps_per_interval: float
-    mode: str
-    x: np.ndarray
-    status: Status
+    sum_rule: list[float]
+    growths: Sequence[np.ndarray]
+    intervals: list[int]
+    jumps_per_interval: list[float]
+    steps_per_interval: list[float]
     values: np.ndarray
-    batches: np.ndarray
 
 
-class Estimate:
-    """Advances a trajectory and accumulates the growth rates, which the kernel returns in bursts.
+class Estimates:
+    """Advances runs of one plan and accumulates their growth rates, which a kernel returns in rounds.
 
-    The trajectory carries a vector for each of the ``k`` exponents, or for all but the last of ``k = n``.
+    The trajectories carry a vector for each of the ``k`` exponents, or for all but the last of ``k = n``. The
+    ``codes (R,)`` tell how the runs have ended, or are DONE for those that are under way. ``counted`` is the
+    number of transitions whose jumps are counted: none, or for a run alone all of them.
     """
 
-    def __init__(self, trajectory: Trajectory, interval: float, k: int) -> None:
-        self.trajectory, self.k = trajectory, k
-        self.interval = interval
-        self.end = end_at(trajectory.run)
-        self.task = trajectory.task(trajectory.no_record(), orthonormal=True)
-        self.grazed_growth = 0.0
-        transitions = len(trajectory.system.transitions)
-        # Numbers per interval: growth rates, the other side of the sum rule, jumps of each transition.
-        self.columns = trajectory.tangents + 1 + transitions
-        self.layout = sums_layout(trajectory.tangents, transitions)
-        self.sums = self.layout.unwritten()
-        self.sums.batch_state[:] = EMPTY
+    def __init__(self, flights: Sequence[Flight], k: int, counted: int = 0) -> None:
+        self.trajectories, lengths = zip(*flights, strict=True)
+        self.k, self.first = k, self.trajectories[0]
+        self.tasks = [each.task(each.no_record(), orthonormal=True) for each in self.trajectories]
+        self.layout = growths_layout(len(flights), self.first.tangents, counted)
+        growths = self.growths = self.layout.unwritten()
+        growths.cycles[:] = [each.run.cycle for each in self.trajectories]
+        growths.phases[:] = [each.run.phase for each in self.trajectories]
+        growths.lengths[:] = lengths
+        growths.batch_states[:] = EMPTY
+        self.codes = np.full(len(flights), codes.DONE)
+        self.counts = np.zeros(len(flights), dtype=np.int64)
 
     def release(self) -> None:
-        """Let the next run have the memory of this one and of its trajectory, which nobody may look at."""
-        self.layout.take_back(self.sums)
-        END.take_back(self.end)
-        self.trajectory.release()
+        """Let the next runs have the memory of these, which nobody may look at any more."""
+        self.layout.take_back(self.growths)
+        for each in self.trajectories:
+            each.release()
 
-    def spectrum(self, transient: int, intervals: int, history: bool, bar: Progress) -> LyapunovSpectrum:
-        """The spectrum over ``intervals`` intervals, after ``transient`` intervals."""
-        found: dict[str, Any] = self.run(transient, intervals, history, bar)._asdict()
-        values, batches = found.pop("values"), found.pop("batches")
-        system = original_of(self.trajectory.system)
-        return LyapunovSpectrum(
-            **found,
-            interval=self.interval,
-            names=Names(system.state_names, dict(system.units)),
-            jump_rates=JumpRates.of(system, self.k, values, batches),
-        )
+    def means(self, transient: int, intervals: int, history: bool, go: Callable[[], None]) -> Means:
+        """What is found over ``intervals`` intervals, after ``transient`` intervals.
 
-    def run(self, transient: int, intervals: int, history: bool, bar: Progress) -> Means:
-        """What is found over ``intervals`` intervals, after ``transient`` intervals."""
-        work = self.rounds(transient, intervals, history)
-        rates = next(work)
-        while True:
-            try:
-                rates = work.send(self._filled(rates, bar))
-            except StopIteration as end:
-                found: Means = end.value
-                return found
-
-    def rounds(
-        self, transient: int, intervals: int, history: bool
-    ) -> Generator[np.ndarray, tuple[int, int], Means]:
-        """``run``, which leaves to others how the intervals are computed.
-
-        It yields arrays for the growth rates of the next intervals, and is sent how many of their rows are
-        filled, and the code of the run.
+        ``go()`` takes the runs that are under way through the intervals of the next round.
         """
-        trajectory, k = self.trajectory, self.k
-        system, code = trajectory.system, codes.DONE
+        growths, k, runs, system = self.growths, self.k, len(self.codes), self.first.system
         if transient:
-            _, code = yield from self._collect(transient, None, False)
-            self.sums.batch_state[:] = EMPTY
-            self._replace_annihilated()
-            # A vector of which only rounding was left is by now a new direction, like those at the start.
-            trajectory.run.indistinct = 0
-        mean = TaperedMean(self.columns)
-        jumps, steps = trajectory.run.jumps, trajectory.run.steps
-        self.grazed_growth = trajectory.run.ill_conditioned_growth
-        growths = np.empty((0, k))
-        if code == codes.DONE:
-            growths, code = yield from self._collect(intervals, mean, history)
-        values = self._completed(mean.value())
-        means = self._completed(closed_batch_means(self.sums.batches, self.sums.batch_state))
-        error = standard_error_from_batches(means[:, :k]) * taper_inflation()
-        count = max(mean.count, 1)
-        compares = k == trajectory.tangents and least_dimension(system) == system.tangent_dimension
+            for _ in self._rounds(transient, go):
+                pass
+            growths.batch_states[:] = EMPTY
+            for each in self.trajectories:
+                # A vector of which only rounding was left is by now a new direction, like those at the start.
+                each.run.indistinct, each.run.ill_conditioned_growth = 0, 0.0
+            for i in np.flatnonzero(~self._stacked("y")[:, self.first.model.dimension :].all(axis=1)):
+                _replace_annihilated(self.trajectories[i])
+        mean = TaperedMean((runs, growths.rates.shape[-1]))
+        kept, before = [np.empty((runs, 0, k))], self._made()
+        for rates in self._rounds(intervals, go):
+            mean.add(rates)
+            self.counts += growths.done
+            if history:
+                kept.append(self._completed(rates)[..., :k].copy())
+        values = self._completed(mean.value(self.counts))
+        error = np.empty((runs, k))
+        for places in self._alike():
+            error[places] = standard_error_from_batches(self.batches(places)[..., :k]) * taper_inflation()
+        jumps, steps = ((self._made() - before) / np.maximum(self.counts, 1)).tolist()
+        compares = k == self.first.tangents and least_dimension(system) == system.tangent_dimension
         return Means(
-            values[:k],
+            values[:, :k],
             error,
-            float(values[k]) if compares else math.nan,
-            growths,
-            mean.count,
-            (trajectory.run.jumps - jumps) / count,
-            (trajectory.run.steps - steps) / count,
-            trajectory.mode,
-            without_age(original_of(system), trajectory.x),
-            self._status(code, count),
+            values[:, k].tolist() if compares else [math.nan] * runs,
+            [each[:count] for each, count in zip(np.concatenate(kept, axis=1), self.counts, strict=True)],
+            self.counts.tolist(),
+            jumps,
+            steps,
             values,
-            means,
         )
 
-    def _collect(
-        self, intervals: int, mean: TaperedMean | None, history: bool
-    ) -> Generator[np.ndarray, tuple[int, int], tuple[np.ndarray, int]]:
-        total, code = 0, int(codes.DONE)
-        kept = [np.empty((0, self.k))]
-        while total < intervals and code == codes.DONE:
-            # Add whole blocks to the mean, so that its rounding does not depend on where bursts end.
-            rates = np.empty((min(INTERVALS_AT_ONCE, intervals - total), self.columns))
-            filled, code = yield rates
-            total += filled
-            if mean is not None:
-                mean.add(rates[:filled])
-            if history:
-                kept.append(self._completed(rates[:filled])[:, : self.k])
-        return np.concatenate(kept) if history else kept[0], code
+    def batches(self, places: list[int]) -> np.ndarray:
+        """The means ``(..., b, columns)`` of the batches of runs that have the same number of batches."""
+        growths = self.growths
+        means = closed_batch_means(growths.batches, growths.batch_states[places[0]])
+        return self._completed(means[places])
 
-    def _filled(self, rates: np.ndarray, bar: Progress) -> tuple[int, int]:
-        """Fill the rows of ``rates`` in bursts; how many were filled, and the code of the run."""
-        filled, resumed, code = 0, False, int(codes.DONE)
-        bursts = Bursts([self.trajectory])
-        while filled < len(rates) and code in (codes.DONE, codes.GO_ON):
-            code = self._rates(bursts.most(), resumed, rates[filled:])
-            done = int(self.end.done)
-            filled += done
-            bar.update(done)
+    def _stacked(self, name: str) -> np.ndarray:
+        """An array of each run ``(R, ...)``."""
+        return np.array([getattr(each.run, name) for each in self.trajectories])
+
+    def _made(self) -> np.ndarray:
+        """The jumps and the steps of the runs so far ``(2, R)``."""
+        return self._stacked("counters")[:, JUMPS_AND_STEPS].T
+
+    def _rounds(self, intervals: int, go: Callable[[], None]) -> Iterator[np.ndarray]:
+        """The rates ``(R, m, columns)`` of intervals, round by round; zero after the end of a run."""
+        growths, total = self.growths, 0
+        while total < intervals and (self.codes == codes.DONE).any():
+            count = growths.count = min(INTERVALS_AT_ONCE, intervals - total)
+            growths.done[:] = 0
+            go()
+            rates = growths.rates[:, :count]
+            for i in np.flatnonzero(growths.done < count):
+                rates[i, growths.done[i] :] = 0.0
+            yield rates
+            total += count
+
+    def _alike(self) -> Iterable[list[int]]:
+        """The runs whose batches are of one number and size: all of them, unless some end early."""
+        found: dict[bytes, list[int]] = {}
+        for i, state in enumerate(self.growths.batch_states):
+            found.setdefault(state.tobytes(), []).append(i)
+        return found.values()
+
+    def alone(self, bar: Progress) -> None:
+        """Take the only run through a round, in bursts."""
+        kernel, advance = load_kernels("lyapunov.kernels").growth_rates, load_kernels().advance
+        trajectory, growths, [task] = self.first, self.growths, self.tasks
+        resumed, code = False, int(codes.DONE)
+        bursts = Bursts([trajectory])
+        while growths.done[0] < growths.count and code in (codes.DONE, codes.GO_ON):
+            most, before = bursts.most(), int(growths.done[0])
+
+            def more(parts: Any, resumed: bool = resumed, most: int = most) -> int:
+                return kernel(advance, parts, task, growths, most, resumed)
+
+            code = trajectory.plan.called(more, trajectory.run, trajectory.work, growths)
+            bar.update(int(growths.done[0]) - before)
             code = bursts.judged(code)
             resumed = code == codes.GO_ON
-        return filled, code
+        self.codes[0] = code
 
     def _completed(self, rates: np.ndarray) -> np.ndarray:
         """Rates ``(..., columns)`` with the last growth: what the others leave of the sum, if not carried."""
-        carried = self.trajectory.tangents
+        carried = self.first.tangents
         if self.k == carried:
             return rates
         total = rates[..., carried]
@@ -444,43 +459,31 @@ class Estimate:
             last = np.where(total == -np.inf, total, total - rates[..., :carried].sum(axis=-1))
         return np.insert(rates, carried, last, axis=-1)
 
-    def _rates(self, most: int, resumed: bool, rates: np.ndarray) -> int:
-        """One burst of the kernel: growth rates over the next intervals, in the rows of ``rates``."""
-        kernel, advance = load_kernels("lyapunov.kernels").growth_rates, load_kernels().advance
-        trajectory, end, sums = self.trajectory, self.end, self.sums
-        end.done = 0
-        return trajectory.plan.called(
-            lambda parts: kernel(advance, parts, self.task, end, sums, self.interval, most, resumed, rates),
-            trajectory.run,
-            trajectory.work,
-            end,
-            sums,
-        )
-
-    def _replace_annihilated(self) -> None:
-        """Give a new direction to each tangent vector that a jump has annihilated.
-
-        A direction that is annihilated again and again has the exponent minus infinity. Annihilation during
-        the transient alone does not mean that.
-        """
-        run, n = self.trajectory.run, self.trajectory.model.dimension
-        if run.y[n:].all():
-            return
-        vectors = run.y[n:].reshape(-1, n)[:, : self.trajectory.system.tangent_dimension]
-        n = vectors.shape[1]
-        gone = ~vectors.any(axis=1)
-        if gone.any():
-            kept = vectors[~gone]
-            basis, _ = np.linalg.qr(np.vstack([kept, generic_directions(n, n)]).T)
-            vectors[gone] = basis[:, len(kept) : len(vectors)].T
-            orthonormal_at_start(self.trajectory)
-
-    def _status(self, code: int, intervals: int) -> Status:
-        status = status_of(self.trajectory, code)
-        run, grazed = self.trajectory.run, int(self.trajectory.run.ill_conditioned)
-        if not status.ok or not grazed:
+    def status(self, i: int) -> Status:
+        """How run ``i`` has ended."""
+        trajectory = self.trajectories[i]
+        status = status_of(trajectory, int(self.codes[i]))
+        run = trajectory.run
+        if not status.ok or not run.ill_conditioned:
             return status
-        share = (run.ill_conditioned_growth - self.grazed_growth) / (self.interval * intervals)
+        share = run.ill_conditioned_growth / (self.growths.lengths[i] * max(self.counts[i], 1))
         return attrs.evolve(
             status, message=f"{status.message} They contribute {share:.3g} to the first exponent."
         )
+
+
+def _replace_annihilated(trajectory: Trajectory) -> None:
+    """Give a new direction to each tangent vector that a jump has annihilated.
+
+    A direction that is annihilated again and again has the exponent minus infinity. Annihilation during the
+    transient alone does not mean that.
+    """
+    n = trajectory.model.dimension
+    vectors = trajectory.run.y[n:].reshape(-1, n)[:, : trajectory.system.tangent_dimension]
+    n = vectors.shape[1]
+    gone = ~vectors.any(axis=1)
+    if gone.any():
+        kept = vectors[~gone]
+        basis, _ = np.linalg.qr(np.vstack([kept, generic_directions(n, n)]).T)
+        vectors[gone] = basis[:, len(kept) : len(vectors)].T
+        orthonormal_at_start(trajectory)

@@ -47,9 +47,9 @@ def standard_error(series: Array) -> Array:
     (k,) array
         See `standard_error_from_batches`, which receives at most `MAX_BATCHES` batches of equal size.
     """
-    series = np.asarray(series, dtype=float)
-    size = max(1, math.ceil(len(series) / MAX_BATCHES))
-    return standard_error_from_batches(merged(series, size))
+    series = np.asarray(series, dtype=float).T
+    size = max(1, math.ceil(series.shape[1] / MAX_BATCHES))
+    return standard_error_from_batches(_merged(series, size).T)
 
 
 def standard_error_from_batches(batch_means: Array) -> Array:
@@ -69,12 +69,12 @@ def standard_error_from_batches(batch_means: Array) -> Array:
 
     Parameters
     ----------
-    batch_means : (b, k) array
+    batch_means : (..., b, k) array
         Means of consecutive batches of the series.
 
     Returns
     -------
-    (k,) array
+    (..., k) array
         ``nan`` for fewer than 4 batches; ``0`` for a column with minus infinity, whose mean is exactly minus
         infinity; ``nan`` for a column with ``nan`` or plus infinity.
 
@@ -91,49 +91,54 @@ def standard_error_from_batches(batch_means: Array) -> Array:
     >>> bool(0.005 < standard_error(noise)[0] < 0.02)
     True
     """
-    means = np.asarray(batch_means, dtype=float)
-    count = len(means)
+    # One series after the other in memory: their sums are fast.
+    means = np.ascontiguousarray(np.swapaxes(batch_means, -2, -1), dtype=float)
+    count = means.shape[-1]
     if count < 4:
-        return np.full(means.shape[1:], np.nan)
-    finite = np.isfinite(means).all(axis=0)
-    deviations = np.where(finite, means, 0.0)
-    deviations = deviations - deviations.mean(axis=0)
+        return np.full(means.shape[:-1], np.nan)
+    # Not a number is neither above nor below another one.
+    least, largest = means.min(axis=-1), means.max(axis=-1)
+    finite, collapsed = (least > -np.inf) & (largest < np.inf), (least == -np.inf) & (largest < np.inf)
+    deviations = np.where(finite[..., None], means, 0.0)
+    deviations -= deviations.mean(axis=-1, keepdims=True)
 
     nu = min(FREQUENCIES, count // 2)
-    spectrum = (_cosines(count, nu) @ deviations) ** 2
-    coarse = merged(deviations, max(1, count // COARSE_BATCHES))
-    seen = _autoregressive_spectrum(_lag_one_correlation(coarse), len(coarse), nu)
-    error = np.sqrt(spectrum.mean(axis=0) / seen / count) * TWO_SIGMA_OF_STUDENT[nu - 1]
-
-    collapsed = (means == -np.inf).any(axis=0) & ~(np.isnan(means) | (means == np.inf)).any(axis=0)
+    projections = deviations @ _cosines(count, nu)
+    spectrum = np.vecdot(projections, projections) / nu
+    coarse = _merged(deviations, max(1, count // COARSE_BATCHES))
+    seen = _autoregressive_spectrum(_lag_one_correlation(coarse), coarse.shape[-1], nu)
+    error = np.sqrt(spectrum / seen / count) * TWO_SIGMA_OF_STUDENT[nu - 1]
     return np.where(finite, error, np.where(collapsed, 0.0, np.nan))
 
 
-def merged(series: Array, size: int) -> Array:
-    """Means of batches of ``size`` rows; a remainder is dropped at the start, near the transient."""
-    count = len(series) // size
-    return series[len(series) - count * size :].reshape(count, size, *series.shape[1:]).mean(axis=1)
+def _merged(series: Array, size: int) -> Array:
+    """Means of ``size`` neighbours in series ``(..., M)``; a remainder is dropped at the start."""
+    *stack, length = series.shape
+    count = length // size
+    # As a product, since the sums of a few numbers each take ten times as long.
+    return series[..., length - count * size :].reshape(*stack, count, size) @ np.full(size, 1.0 / size)
 
 
 @lru_cache(64)
 def _cosines(count: int, nu: int) -> Array:
-    """Rows 1 to ``nu`` of the orthonormal discrete cosine transform of type II; row 0 is the constant."""
+    """Columns 1 to ``nu`` of the orthonormal discrete cosine transform of type II; column 0 is constant."""
     i, j = np.arange(count) + 0.5, np.arange(1, nu + 1)
-    return np.sqrt(2.0 / count) * np.cos(np.pi / count * np.outer(j, i))
+    return np.sqrt(2.0 / count) * np.cos(np.pi / count * np.outer(i, j))
 
 
 def _lag_one_correlation(deviations: Array) -> Array:
     """Correlation of neighbours, minus its bias ``-(1 + 3 r) / n`` (Marriott, Pope 1954), cut to 0 .. 0.9."""
-    variance = (deviations**2).sum(axis=0)
-    covariance = (deviations[1:] * deviations[:-1]).sum(axis=0)
+    variance = np.vecdot(deviations, deviations)
+    covariance = np.vecdot(deviations[..., 1:], deviations[..., :-1])
     r = np.divide(covariance, variance, out=np.zeros_like(variance), where=variance > 0.0)
-    return np.clip(r + (1.0 + 3.0 * r) / len(deviations), 0.0, MAX_CORRELATION)
+    return np.clip(r + (1.0 + 3.0 * r) / deviations.shape[-1], 0.0, MAX_CORRELATION)
 
 
 def _autoregressive_spectrum(r: Array, count: int, nu: int) -> Array:
     """Mean of an AR(1) spectrum over the first ``nu`` cosine frequencies, relative to frequency zero."""
-    angle = np.pi / count * np.arange(1, nu + 1).reshape(-1, *(1,) * r.ndim)
-    return ((1.0 - r) ** 2 / (1.0 - 2.0 * r * np.cos(angle) + r**2)).mean(axis=0)
+    angle = np.pi / count * np.arange(1, nu + 1)
+    r = r[..., None]
+    return ((1.0 - r) ** 2 / (1.0 - 2.0 * r * np.cos(angle) + r**2)).mean(axis=-1)
 
 
 class TaperedMean:
@@ -150,8 +155,8 @@ class TaperedMean:
 
     Parameters
     ----------
-    columns
-        Number of series.
+    shape
+        Number of series, or the shape ``(..., columns)`` of a stack of them.
 
     References
     ----------
@@ -159,29 +164,36 @@ class TaperedMean:
        4111, https://doi.org/10.1088/1361-6544/aa84c2.
     """
 
-    def __init__(self, columns: int) -> None:
+    def __init__(self, shape: int | tuple[int, ...]) -> None:
+        *stack, columns = (shape,) if isinstance(shape, int) else shape
         self.count = 0
-        self._moments = np.zeros((3, columns))
-        self._collapsed = np.zeros(columns, dtype=bool)
+        self._moments = np.zeros((*stack, columns, 3))
+        self._collapsed = np.zeros((*stack, columns), dtype=bool)
 
     def add(self, rows: Array) -> None:
-        """Append ``rows (m, columns)`` to the series."""
+        """Append ``rows (..., m, columns)`` to the series."""
         collapsed = rows == -np.inf
         if collapsed.any():
-            self._collapsed |= collapsed.any(axis=0)
+            self._collapsed |= collapsed.any(axis=-2)
             rows = np.where(collapsed, 0.0, rows)
-        place = np.arange(len(rows)) + (self.count + 0.5)
+        place = np.arange(rows.shape[-2]) + (self.count + 0.5)
         square = place * place
-        # Three sums give the tapered mean, with these powers of the place in the series as weights.
-        for moment, weight in zip(self._moments, (square, square * place, square * square), strict=True):
-            moment += weight @ rows
-        self.count += len(rows)
+        # Three sums give the tapered mean, with these powers of the place in the series as weights. Each
+        # series is summed by itself, which is the same to the last bit whatever stands beside it.
+        weights = np.stack([square, square * place, square * square])
+        series = np.ascontiguousarray(np.swapaxes(rows, -2, -1))[..., None, :]
+        self._moments += (series @ weights.T)[..., 0, :]
+        self.count += rows.shape[-2]
 
-    def value(self) -> Array:
-        """The mean ``(columns,)`` so far; ``nan`` without rows, minus infinity after an entry of -inf."""
-        if self.count == 0:
-            return np.full(self._moments.shape[1], np.nan)
-        return np.where(self._collapsed, -np.inf, _tapered(self._moments, float(self.count)))
+    def value(self, counts: NDArray[np.int64] | None = None) -> Array:
+        """The mean ``(..., columns)`` so far; ``nan`` without rows, minus infinity after an entry of -inf.
+
+        A series of a stack may end before the others, and go on with rows of zeros: ``counts (...)`` are the
+        numbers of rows before these.
+        """
+        size = np.array(self.count if counts is None else counts, dtype=float)[..., None]
+        size[size == 0.0] = np.nan
+        return np.where(self._collapsed, -np.inf, _tapered(np.moveaxis(self._moments, -1, 0), size))
 
 
 def running_tapered_mean(series: Array) -> Array:
@@ -195,11 +207,8 @@ def running_tapered_mean(series: Array) -> Array:
 
 def _tapered(moments: Array, size: Array | float) -> Array:
     """Tapered means from the moments, three along the first axis, of the first ``size`` rows."""
-    # Sum of the weights, in closed form by the sums of even powers at half-integers.
-    square = size * (4 * size**2 - 1) / 12
-    cube = size**2 * (2 * size**2 - 1) / 8
-    fourth = size * (48 * size**4 - 40 * size**2 + 7) / 240
-    total = size**2 * square - 2 * size * cube + fourth
+    # The sum of the weights in closed form.
+    total = size * (8 * size**4 + 7) / 240
     return (size**2 * moments[0] - 2 * size * moments[1] + moments[2]) / total
 
 

@@ -21,9 +21,12 @@ class _Silent:
         pass
 
 
+SILENT = _Silent()
+
+
 def silent() -> Progress:
-    """A receiver that shows nothing."""
-    return _Silent()
+    """The receiver that shows nothing."""
+    return SILENT
 
 
 # Seconds before a bar appears that nobody has asked for.
@@ -40,7 +43,7 @@ def progress_bar(
     If nobody knows the ``total`` (None), the bar counts.
     """
     if shown is False or (shown is None and not _is_watched()):
-        yield _Silent()
+        yield SILENT
         return
     with warnings.catch_warnings():
         # Without ipywidgets a notebook gets the bar of a terminal.

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 
 from hybrid.compiler.interrupts import CTRL_C, stopped_by
-from hybrid.display.progress import Progress
+from hybrid.display.progress import Progress, silent
 from hybrid.simulation.crew import TOGETHER
 from hybrid.sweep.local import LOOK
 
@@ -17,8 +17,10 @@ BLOCKS_PER_THREAD = 8
 
 def run_in_blocks(run: Callable[[range], object], count: int, threads: int, bar: Progress) -> None:
     """Call ``run`` with ranges that make up ``range(count)``; an interrupt stops the threads."""
+    # A single thread needs blocks only to show how far it is.
+    parts = 1 if threads == 1 and bar is silent() else BLOCKS_PER_THREAD * threads
     # A block has enough runs that they take their steps together, if each thread has some.
-    size = max(min(TOGETHER, -(-count // threads)), -(-count // (BLOCKS_PER_THREAD * threads)), 1)
+    size = max(min(TOGETHER, -(-count // threads)), -(-count // parts), 1)
     blocks = [range(i, min(i + size, count)) for i in range(0, count, size)]
     if threads > 1 and len(blocks) > 1:
         _in_threads(run, blocks, threads, bar)

@@ -54,12 +54,13 @@ def attributes_of(task: Callable[..., Any]) -> dict[str, Any]:
     """Attributes of a dataset that say what made it, the parameters and versions included."""
     facts = facts_of(task)
     made_by = {"task": facts["task"], "task_hash": _hash(json.dumps(facts))}
-    system = model_of(task)
+    system, given = model_of(task), getattr(task, "facts", None) or {}
     if system is not None:
+        # The text of a model takes long to write, and the model is often one of the facts.
+        text = facts["model"] if given.get("model") is system else _described(system, set())
         made_by["model"] = system.name or "unnamed"
-        made_by["model_hash"] = _hash(_described(system, set()))
+        made_by["model_hash"] = _hash(text)
         made_by["model_parameters"] = json.dumps(dict(system.parameters))
-    given = getattr(task, "facts", None) or {}
     made_by |= {
         name: value if isinstance(value, str | int | float) else json.dumps(value, default=repr)
         for name, value in given.items()
@@ -167,7 +168,7 @@ def _own_code(task: Any) -> str:
         return _own_code(task.__func__)
     if isinstance(task, FunctionType):
         defaults = _described((task.__defaults__, task.__kwdefaults__), set())
-        return _described_code(task.__code__, set()) + defaults
+        return _described_code(task.__code__) + defaults
     return _described((task, vars(type(task)).get("__call__")), set())
 
 
@@ -199,7 +200,7 @@ def _described(value: Any, seen: set[int]) -> str:
             return f"split {_described(value.growth.original, seen)}"
         return f"{value.name or 'unnamed'} {_hash(_described_fields(value, seen))}"
     if isinstance(value, CodeType):
-        return _described_code(value, seen)
+        return _described_code(value)
     if isinstance(value, functools.partial):
         inside = _described((value.func, value.args, value.keywords), seen)
         return f"partial{inside}"
@@ -226,19 +227,20 @@ def _described_fields(value: Any, seen: set[int]) -> str:
     return _described({field.name: getattr(value, field.name) for field in fields}, seen)
 
 
-def _described_code(code: CodeType, seen: set[int]) -> str:
+@functools.lru_cache(KEPT)
+def _described_code(code: CodeType) -> str:
     """Instructions, names and constants; line numbers do not count."""
     constants = [each for each in code.co_consts if each is not None]
     if code.co_consts and isinstance(code.co_consts[0], str) and code.co_flags & 0x3:
         # A docstring comes first, and decides nothing.
         constants = constants[1:] if code.co_consts[0] == constants[0] else constants
-    return _described((code.co_code, code.co_names, code.co_varnames, constants), seen)
+    return _described((code.co_code, code.co_names, code.co_varnames, constants), set())
 
 
 def _described_function(function: FunctionType, seen: set[int]) -> str:
     if _is_installed(function.__code__.co_filename):
         return f"{function.__module__}.{function.__qualname__}"
-    parts = [_described_code(function.__code__, seen)]
+    parts = [_described_code(function.__code__)]
     parts += [_described((function.__defaults__, function.__kwdefaults__), seen)]
     parts += [f"{name}: {_described(value, seen)}" for name, value in _taken(function).items()]
     return f"{function.__qualname__} {_hash(' '.join(parts))}"

@@ -27,7 +27,7 @@ from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, as_system, check_mode, starting_mode
 from hybrid.system.growth import Unexplored
 from hybrid.system.labels import by_label, named, plain_name
-from hybrid.transform.aged import aged, without_age
+from hybrid.transform.aged import aged, with_age, without_age
 from hybrid.transform.markers import with_section
 
 # Where the points of a section are taken: per forcing period, at crossings of a surface, or at each jump.
@@ -91,35 +91,28 @@ class Rows:
         for system, count in {(with_tangents, tangents), (self.system, 0), (self.marked, 0)}:
             plan_of(compile_system(system), self.solver, count)
 
-    def begin(
-        self,
-        point: Mapping[str, float],
-        place: Place | None,
-        tangent: np.ndarray | None,
-        system: HybridSystem,
-    ) -> Trajectory:
+    def common(self, system: HybridSystem, tangent: np.ndarray | None, t0: float) -> Common:
+        """What runs of rows share that begin on a system with these tangent vectors."""
+        system, _, tangent = directed(system, self.x0, tangent)
+        return Common(compile_system(system), self.solver, tangent, t0)
+
+    def begin(self, point: Mapping[str, float], place: Place | None, common: Common) -> Trajectory:
         """A trajectory at the start of a row: at the place, if the system can start there beyond no guard."""
         if place is not None:
             with suppress(HybridError):
-                trajectory = self.go_on(point, place, tangent, system, self.t0)
+                trajectory = self.go_on(point, place, common)
                 if not trajectory.beyond:
                     return trajectory
-        return self.go_on(point, (self.origin(point), self.mode), tangent, system, self.t0)
+        return self.go_on(point, (self.origin(point), self.mode), common)
 
-    def go_on(
-        self,
-        point: Mapping[str, float],
-        place: Place,
-        tangent: np.ndarray | None,
-        system: HybridSystem,
-        t0: float,
-    ) -> Trajectory:
-        """A trajectory from a place."""
-        state, values = place[0], self.values(point)
-        mode = starting_mode(system, place[1])
-        explore(system, t0, state, values, mode)
-        system, state, tangent = directed(system, state, tangent)
-        return Common(compile_system(system), self.solver, tangent, t0).begin_at(state, mode, values)
+    def go_on(self, point: Mapping[str, float], place: Place, common: Common) -> Trajectory:
+        """A trajectory from a place, whose state may lack the age."""
+        system, values, (state, mode) = common.compiled.system, self.values(point), place
+        if len(state) < system.dimension:
+            state = with_age(self.system, state)
+        mode = starting_mode(system, mode)
+        explore(system, common.t0, state, values, mode)
+        return common.begin_at(state, mode, values)
 
     def values(self, point: Mapping[str, float]) -> np.ndarray:
         """The parameter vector of a row."""

@@ -224,6 +224,29 @@ def test_tapered_mean_of_nothing_is_nan():
     assert np.isnan(TaperedMean(1).value()[0])
 
 
+@pytest.mark.parametrize("columns", [1, 3])
+def test_a_series_of_a_stack_is_to_the_last_bit_what_it_is_alone(columns):
+    stack = np.random.default_rng(13).standard_normal((24, 300, columns))
+    stack[1, 7, 0], stack[2, 8, 0] = -np.inf, np.nan
+    mean = TaperedMean((24, columns))
+    mean.add(stack)
+    means, errors = mean.value(), standard_error_from_batches(stack)
+    for i, series in enumerate(stack):
+        np.testing.assert_array_equal(means[i], [tapered_mean(column[:, None])[0] for column in series.T])
+        np.testing.assert_array_equal(errors[i], standard_error_from_batches(series))
+
+
+def test_a_series_may_end_before_the_others_of_its_stack():
+    stack = np.random.default_rng(14).standard_normal((3, 300, 2))
+    counts = np.array([300, 40, 0])
+    for series, count in zip(stack, counts, strict=True):
+        series[count:] = 0.0
+    mean = TaperedMean((3, 2))
+    mean.add(stack)
+    expected = [tapered_mean(series[:count]) for series, count in zip(stack, counts, strict=True)]
+    np.testing.assert_allclose(mean.value(counts), expected, rtol=1e-12)
+
+
 @pytest.mark.parametrize("phi", [0.5, 0.7])
 def test_the_correlation_of_neighbours_has_no_bias(phi):
     """In 256 values the plain estimate is too small by ``(1 + 3 phi) / 256`` (Marriott, Pope 1954)."""
@@ -231,5 +254,5 @@ def test_the_correlation_of_neighbours_has_no_bias(phi):
     noise = rng.standard_normal((256, 20_000))
     noise[0] /= np.sqrt(1.0 - phi**2)
     series = lfilter([1.0], [1.0, -phi], noise, axis=0)
-    found = averages._lag_one_correlation(series - series.mean(axis=0))
+    found = averages._lag_one_correlation((series - series.mean(axis=0)).T)
     assert found.mean() == pytest.approx(phi, abs=3.5e-3)
