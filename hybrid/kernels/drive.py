@@ -131,7 +131,7 @@ def enter(parts, task):
         take_clear_sides(model, run)
         begin_stay(run, mode)
         return GO_ON
-    fires = parts.enter(model, run, task.work)
+    fires = parts.enter(model, task.method, run, task.work)
     if fires == RESTING or (fires == NO_TRANSITION and parts.rests_on_guard(task)):
         if model.accumulates_to[run.last_fired] == NO_MODE:
             run.at_rest = 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, NoReturn
 
 import numpy as np
@@ -20,7 +21,7 @@ UNDEFINED = -1
 
 
 def choose_mode(
-    system: HybridSystem, parts: Any, model: Any, run: Any, work: Any, mode: str | None
+    system: HybridSystem, plan: Any, model: Any, run: Any, work: Any, mode: str | None
 ) -> tuple[int, tuple[str, ...]]:
     """Index of the mode to start in: the one named, the only one, or the only one that allows the state.
 
@@ -38,7 +39,7 @@ def choose_mode(
         [mode] = system.whole_modes
     if mode is not None:
         within = system.parts_of(mode)
-        verdicts, _ = _verdicts(system, parts, model, run, work, within)
+        verdicts, _ = _verdicts(system, plan, model, run, work, within)
         if len(within) > 1:
             # Guards of the user's may be crossed, as the mode is named; the sides of its parts must be right.
             against = [(tr.part_of, tr.source) for tr in _against(system, verdicts)]
@@ -53,7 +54,7 @@ def choose_mode(
             beyond = [system.transitions[i] for i in own if verdicts[i] == codes.BEYOND]
             return index, tuple(tr.name for tr in beyond)
         return _refused(system, run, verdicts, [modes[i] for i in within])
-    verdicts, undefined = _verdicts(system, parts, model, run, work, range(len(modes)))
+    verdicts, undefined = _verdicts(system, plan, model, run, work, range(len(modes)))
     violated = {transition.source for transition in _against(system, verdicts)}
     if undefined and len(violated) == len(modes):
         # Otherwise it may be a guard of modes to which the state does not belong.
@@ -92,22 +93,23 @@ def _refused(system: HybridSystem, run: Any, verdicts: list[int], allowed: list[
 
 
 def _verdicts(
-    system: HybridSystem, parts: Any, model: Any, run: Any, work: Any, modes: Sequence[int]
+    system: HybridSystem, plan: Any, model: Any, run: Any, work: Any, modes: Sequence[int]
 ) -> tuple[list[int], dict[int, float]]:
     """One code per transition that leaves one of the modes: whether its guard allows the start of the run.
 
     Also the values of guards that are not finite, by transition, if there are several modes.
     """
     verdicts = np.zeros(len(system.transitions), dtype=np.int64)
-    kernel = load_kernels("hybrid.kernels.events.initial_mode").try_modes
+    try_modes = load_kernels("hybrid.kernels.events.initial_mode").try_modes
+    kernel = partial(try_modes, plan.parts_so_far, model, plan.method, run, work)
     undefined: dict[int, float] = {}
     if len(modes) == len(system.mode_names):
         # One call for all of them is faster, and enough unless a guard is not finite.
-        if kernel(parts, model, run, work, 0, len(modes), verdicts) == codes.NO_TRANSITION:
+        if kernel(0, len(modes), verdicts) == codes.NO_TRANSITION:
             return verdicts.tolist(), undefined
         verdicts[:] = codes.NO_OBJECTION
     for mode in modes:
-        transition = kernel(parts, model, run, work, mode, mode + 1, verdicts)
+        transition = kernel(mode, mode + 1, verdicts)
         if transition == codes.NO_TRANSITION:
             continue
         if len(modes) == 1:

@@ -118,7 +118,7 @@ class Common:
         check_time(self.time, self.t0, model.period)
         phase0 = memory.begin(model, state, self.tangent, self.t0, self.horizon)
         run = memory.run
-        index, beyond = choose_mode(compiled.system, plan.parts_so_far, model, run, memory.work, mode)
+        index, beyond = choose_mode(compiled.system, plan, model, run, memory.work, mode)
         if beyond and model.propagator[index] in (codes.DESINGULARISED, codes.ROOTED):
             # These series hold the root of a guard, which may be negative here.
             plan.take_back(memory)
@@ -126,7 +126,7 @@ class Common:
             memory = plan.memory()
             model = model_of(plan, memory)
             memory.begin(model, state, self.tangent, self.t0, self.horizon)
-            choose_mode(compiled.system, plan.parts_so_far, model, memory.run, memory.work, mode)
+            choose_mode(compiled.system, plan, model, memory.run, memory.work, mode)
         memory.run.mode = index
         most = self.solver.max_steps
         return Trajectory(compiled, plan, model, memory, tangents, most, phase0, beyond, self.stop)

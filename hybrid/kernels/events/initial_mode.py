@@ -7,7 +7,7 @@ from numba import njit
 from hybrid.kernels.events.guards import allowed, guard_value
 from hybrid.kernels.types.codes import BEYOND, LEAVES, NO_OBJECTION, NO_TRANSITION
 from hybrid.kernels.types.kinds import INDICES, INTEGER
-from hybrid.kernels.types.layout import Model, Parts, Run, Work
+from hybrid.kernels.types.layout import Method, Model, Parts, Run, Work
 from hybrid.kernels.types.options import KERNEL, exported
 
 
@@ -19,7 +19,7 @@ def forget_scale(model, run):
 
 
 @njit(**KERNEL)
-def verdicts_on(parts, model, run, work, first, stop, verdicts):
+def verdicts_on(parts, model, method, run, work, first, stop, verdicts):
     """Enter the modes ``first`` to ``stop - 1`` at the start of a run, one after another.
 
     The verdict of each of their guards goes into ``verdicts (transitions,)``, which must be zero before.
@@ -29,7 +29,7 @@ def verdicts_on(parts, model, run, work, first, stop, verdicts):
     t = run.phase
     for mode in range(first, stop):
         run.mode = mode
-        fires = parts.enter(model, run, work)
+        fires = parts.enter(model, method, run, work)
         # What is large in one mode tells nothing of the others.
         forget_scale(model, run)
         for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
@@ -47,7 +47,7 @@ def verdicts_on(parts, model, run, work, first, stop, verdicts):
     return NO_TRANSITION
 
 
-@exported(INTEGER, Parts, Model, Run, Work, INTEGER, INTEGER, INDICES)
-def try_modes(parts, model, run, work, first, stop, verdicts):
+@exported(INTEGER, Parts, Model, Method, Run, Work, INTEGER, INTEGER, INDICES)
+def try_modes(parts, model, method, run, work, first, stop, verdicts):
     """As :func:`verdicts_on`, for calls from Python."""
-    return verdicts_on(parts, model, run, work, first, stop, verdicts)
+    return verdicts_on(parts, model, method, run, work, first, stop, verdicts)

@@ -46,7 +46,7 @@ def mode_of_start(parts, task, named, verdicts):
     for i in range(verdicts.shape[0]):
         verdicts[i] = NO_OBJECTION
     first, stop = (0, modes) if named == NO_MODE else (named, named + 1)
-    if verdicts_on(parts, model, task.run, task.work, first, stop, verdicts) != NO_TRANSITION:
+    if verdicts_on(parts, model, task.method, task.run, task.work, first, stop, verdicts) != NO_TRANSITION:
         return NO_MODE
     if named != NO_MODE:
         rooted = model.propagator[named] == DESINGULARISED or model.propagator[named] == ROOTED

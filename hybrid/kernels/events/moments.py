@@ -137,19 +137,20 @@ def sign_along(model, run, transition, place, way, work):
     _, t, x = place
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
     band = rounding_band(model, run, transition, t, x, work)
-    return sign_at_speed(model, run, transition, place, way, speed, band, work)
+    return sign_at_speed(model, run, transition, place, way, speed, band, 1.0, work)
 
 
 @njit(**KERNEL)
-def sign_at_speed(model, run, transition, place, way, speed, band, work):
+def sign_at_speed(model, run, transition, place, way, speed, band, error, work):
     """``sign_along`` for a guard whose ``speed`` and rounding at the place are known.
 
     The speed tells if it keeps half of itself until the guard is out of its rounding, the ``band``, in a unit
-    of time or less. ``work.gradient`` is current.
+    of time or less. State and time are off by their rounding, or by an ``error`` so many times as large.
+    ``work.gradient`` is current.
     """
     mode, t, x = place
-    drift = speed_rounding(model, run, transition, mode, t, x, work)
-    moment = moment_of_rounding(model, run, t, work)
+    drift = error * speed_rounding(model, run, transition, mode, t, x, work)
+    moment, band = error * moment_of_rounding(model, run, t, work), error * band
     if drift < abs(speed) < math.inf and not may_jump(model, run, transition, t, x, work):
         needed = max(band / abs(speed), moment)
         in_time = needed <= max(unit_of_time(model, run, work), moment)
@@ -158,7 +159,7 @@ def sign_at_speed(model, run, transition, place, way, speed, band, work):
     moment *= LONGER
     model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
     longest, feedback = unit_of_time(model, run, work), pace_of_feedback(model, mode, work.jacobian)
-    longest = LONGEST * (min(longest, 1.0 / feedback) if feedback > 0.0 else longest)
+    longest = LONGEST * error**0.2 * (min(longest, 1.0 / feedback) if feedback > 0.0 else longest)
     if not drift < math.inf:
         drift = 0.0
     while 0.0 < moment <= longest < math.inf:
@@ -167,7 +168,7 @@ def sign_at_speed(model, run, transition, place, way, speed, band, work):
         value = guard_value(model, transition, later, work.settled, work.scalar)
         if abs(value) > moment * drift:
             model.guard_gradient(transition, later, work.settled, model.parameters, work.gradient)
-            band = rounding_band(model, run, transition, later, work.settled, work)
+            band = error * rounding_band(model, run, transition, later, work.settled, work)
             if abs(value) > band + moment * drift:
                 return (1 if value > 0.0 else -1), moment, False
         moment *= LONGER

@@ -7,6 +7,7 @@ from numba import njit
 
 from hybrid.kernels.events.guards import (
     allowed,
+    error_band,
     guard_speed,
     guard_value,
     has_program,
@@ -106,13 +107,25 @@ def inherit(model, left, fired, transition, sides):
 
 
 @njit(**KERNEL)
-def side_of(model, run, place, transition, came, before, work):
+def error_of(model, method, run, transition, value, band, work):
+    """How many times its rounding, the ``band``, errors may have left a guard beyond zero; else 1.
+
+    A mode that holds a guard at zero, as a taut rope its length, does so up to the tolerances. The mode that
+    is entered then is not beyond that guard, but on it. ``work.gradient`` is current.
+    """
+    error = error_band(method, run, work.gradient, model.controlled)
+    return error / band if 0.0 < band < value * model.direction[transition] <= error else 1.0
+
+
+@njit(**KERNEL)
+def side_of(model, method, run, place, transition, came, before, new, work):
     """Side of a guard, and how it has left zero (``onset``): 0 off the guard. ``work.field`` is current.
 
-    A guard within its rounding is on the side to which the flow takes it. If it is at rest there, it has not
-    crossed: it keeps the side ``before`` if it was on the guard then, or fires both ways; otherwise it is on
-    the near side. A guard without a value keeps its side. A guard that jumps is never at rest: if the flow
-    does not tell its side, and at the start of a run, its sign does.
+    A guard within its rounding is on the side to which the flow takes it; one that is ``new`` here may also
+    have been moved there by the error of the method. If it is at rest there, it has not crossed: it keeps the
+    side ``before`` if it was on the guard then, or fires both ways; otherwise it is on the near side. A guard
+    without a value keeps its side. A guard that jumps is never at rest: if the flow does not tell its side,
+    and at the start of a run, its sign does.
     """
     _, t, x = place
     value = guard_value(model, transition, t, x, work.scalar)
@@ -121,12 +134,15 @@ def side_of(model, run, place, transition, came, before, work):
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
     band = rounding_band(model, run, transition, t, x, work)
     sign = 1 if value > 0.0 else -1
-    if abs(value) == math.inf or abs(value) > band:
+    error = error_of(model, method, run, transition, value, band, work) if new else 1.0
+    if abs(value) == math.inf or abs(value) > error * band:
         return sign, 0
     jumps = value != 0.0 and may_jump(model, run, transition, t, x, work)
     if came == STARTED and jumps:
         return sign, 0
-    side, _, straight = sign_at_speed(model, run, transition, place, 1.0, speed, band, work)
+    side, _, straight = sign_at_speed(model, run, transition, place, 1.0, speed, band, error, work)
+    if error > 1.0 and side == sign:
+        return sign, 0
     if side != 0:
         return side, BY_SPEED if straight else LATER
     if jumps:
@@ -206,10 +222,10 @@ def crosses_slowly(model, run, place, transition, work):
 
 
 @njit(**KERNEL)
-def side_here(model, run, place, transition, came, before, own, work):
+def side_here(model, method, run, place, transition, came, before, own, new, work):
     """``side_of`` a guard, where one that a coarser rounding let fire early is not taken for crossed."""
     _, t, x = place
-    now, order = side_of(model, run, place, transition, came, before, work)
+    now, order = side_of(model, method, run, place, transition, came, before, new, work)
     if not own and order == 0 and before.side == -now:
         speed = guard_speed(model, transition, t, x, work.field, work.gradient)
         if was_left_behind(model, run, transition, t, x, speed, before.side, work):
@@ -244,17 +260,18 @@ def crossed_by_flow(model, run, place, transition, before, now, order, work):
 
 
 @njit(**KERNEL)
-def take_side(model, run, place, transition, arrival, known_sides, work):
+def take_side(model, method, run, place, transition, arrival, known_sides, work):
     """Take the side of one guard; returns whether the state rests on it, pushed against it."""
     mode, t, x = place
     came, left, fired = arrival
     direction = model.direction[transition]
-    known = came != STARTED
+    known, new = came != STARTED, False
     if came == LANDED and left != mode:
         known = inherit(model, left, fired, transition, known_sides)
+        new = not known
     before = Before(known_sides.side[transition], known_sides.zero[transition]) if known else Before(0, 0)
     own = came == LANDED and left == mode and transition == fired
-    now, order = side_here(model, run, place, transition, came, before, own, work)
+    now, order = side_here(model, method, run, place, transition, came, before, own, new, work)
     if own and order == 0 and is_back_soon(model, run, place, transition, now, work):
         # Off the guard, where it has left the state, the reset's own guard has not been reached again.
         now, order = -now, LATER
@@ -304,7 +321,7 @@ def take_side(model, run, place, transition, arrival, known_sides, work):
 
 
 @njit(**KERNEL)
-def take_sides(model, run, mode, t, x, arrival, known_sides, work):
+def take_sides(model, method, run, mode, t, x, arrival, known_sides, work):
     """Take sides at every guard of a mode; return the transition that must fire now, if any.
 
     ``known_sides`` belong to the previous point on entry, and to this point on return. A guard that has been
@@ -316,7 +333,7 @@ def take_sides(model, run, mode, t, x, arrival, known_sides, work):
     chosen, rests, place = NO_TRANSITION, False, Place(mode, t, x)
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
-        if take_side(model, run, place, transition, arrival, known_sides, work):
+        if take_side(model, method, run, place, transition, arrival, known_sides, work):
             rests = True
         due = known_sides.due[transition] == 1
         if due and chosen == NO_TRANSITION and allowed(model, transition, t, x, work.scalar):

@@ -59,9 +59,11 @@ def hidden_until(model, method, run, path, guard, end, work):
     if may_jump(model, run, transition, start, run.y, work):
         return 0.0, False
     model.guard_gradient(transition, start, run.y, model.parameters, work.gradient)
-    error = 0.0 if path.exact else error_band(method, run, work.gradient, model.controlled)
-    rounding = rounding_band(model, run, transition, start, run.y, work)
-    error, rounding = in_column(path, guard.column, error), in_column(path, guard.column, rounding)
+    error = in_column(path, guard.column, error_band(method, run, work.gradient, model.controlled))
+    rounding = in_column(path, guard.column, rounding_band(model, run, transition, start, run.y, work))
+    if path.exact and farthest_from_zero(model, path, guard, 0.0, work) <= rounding:
+        # Nor has a method that is not exact led to the start of the step.
+        error = 0.0
     size = farthest_from_zero(model, path, guard, length, work)
     if guard.on_guard == AT_REST and size < math.inf:
         # What is zero at the start and rests there has a size and rounding on the step.

@@ -35,7 +35,7 @@ from hybrid.kernels.types.codes import (
     STALE,
 )
 from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH
-from hybrid.kernels.types.layout import Model, Run, Task, Work
+from hybrid.kernels.types.layout import Method, Model, Run, Task, Work
 from hybrid.kernels.types.options import KERNEL, exported
 from hybrid.kernels.types.task import task_of
 
@@ -44,8 +44,8 @@ MOST_JUMPS = 50
 SAME = 1e-9
 
 
-@exported(INTEGER, Model, Run, Work)
-def enter(model, run, work):
+@exported(INTEGER, Model, Method, Run, Work)
+def enter(model, method, run, work):
     """Take sides at every guard of the mode just entered; return a transition that must fire at once, if any.
 
     A transition is locked to this instant, not to its guard, if a reset took the state beyond its guard.
@@ -57,7 +57,7 @@ def enter(model, run, work):
         widen_scale(model, run, work)
     came = STARTED if left == NO_MODE else LANDED
     fired = run.last_fired if run.jumps > 0 else NO_TRANSITION
-    fires = take_sides(model, run, mode, t, run.y, Arrival(came, left, fired), sides_of(run), work)
+    fires = take_sides(model, method, run, mode, t, run.y, Arrival(came, left, fired), sides_of(run), work)
     # Each of those that the start lies beyond fires, in listed order, while the run stays in the mode.
     first = model.first_at_start[mode] if came == STARTED else model.first_at_start[mode + 1]
     if left == mode:
@@ -87,7 +87,7 @@ def arrived(task):
     Sides and rounding are judged as by a run that starts here, which knows nothing of the step that led here,
     and takes a guard that it starts beyond as crossed: then one of the two runs fires the transition.
     """
-    _, model, _, run, _, work = task_of(task)
+    _, model, method, run, _, work = task_of(task)
     mode, t, found = run.mode, run.phase, NO_TRANSITION
     model.field(mode, t, run.y, model.parameters, work.field)
     for i in range(model.dimension):
@@ -103,7 +103,9 @@ def arrived(task):
         if underflows(model, transition, t, run.y, t, run.y, work.scalar):
             continue
         place = Place(mode, t, run.y)
-        now, _ = side_here(model, run, place, transition, STARTED, Before(before, 0), False, work)
+        now, _ = side_here(
+            model, method, run, place, transition, STARTED, Before(before, 0), False, False, work
+        )
         crossed = now == -before and crosses_towards(model.direction[transition], now)
         if crossed and allowed(model, transition, t, run.y, work.scalar):
             found = transition
@@ -113,7 +115,7 @@ def arrived(task):
 
 
 @njit(**KERNEL)
-def settle(model, run, first, out, work):
+def settle(model, method, run, first, out, work):
     """State ``(n,)`` after ``first`` and all jumps that it triggers at the same instant; returns the mode."""
     n, t = model.dimension, run.phase
     mode, fired = run.mode, first
@@ -133,7 +135,7 @@ def settle(model, run, first, out, work):
         left, mode = mode, model.target[fired]
         if mode == NO_MODE:
             break
-        fired = take_sides(model, run, mode, t, out, Arrival(LANDED, left, fired), tried, work)
+        fired = take_sides(model, method, run, mode, t, out, Arrival(LANDED, left, fired), tried, work)
         if fired < 0:
             break
     for i in range(n):
@@ -142,10 +144,10 @@ def settle(model, run, first, out, work):
 
 
 @njit(**KERNEL)
-def order_matters(model, run, one, other, work):
+def order_matters(model, method, run, one, other, work):
     """Whether firing ``one`` or ``other`` first leads to different states or modes."""
-    mode_one = settle(model, run, one, work.error, work)
-    mode_other = settle(model, run, other, work.second_error, work)
+    mode_one = settle(model, method, run, one, work.error, work)
+    mode_other = settle(model, method, run, other, work.second_error, work)
     if mode_one != mode_other:
         return True
     for i in range(model.dimension):
@@ -193,7 +195,7 @@ def has_only_touched(model, run, record, fired, side, work):
 
 
 @njit(**KERNEL)
-def first_due(model, run, work):
+def first_due(model, method, run, work):
     """The first transition that is due and allowed; whether it matters which one fires first is counted."""
     t, chosen, first, together, matters = run.phase, NO_TRANSITION, NO_TRANSITION, 0, False
     for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
@@ -208,7 +210,7 @@ def first_due(model, run, work):
         if together == 1:
             first = other
         elif not matters:
-            matters = order_matters(model, run, first, other, work)
+            matters = order_matters(model, method, run, first, other, work)
     run.order_mattered += 1 if matters else 0
     return chosen
 
@@ -222,14 +224,14 @@ def first_in_order(task, fired, stop_cycle, stop_phase):
     the guard there, and what comes after it, may differ by rounding alone, so its side is left to the next
     step: the crossing is behind, and cannot be found where it was refused.
     """
-    _, model, _, run, record, work = task_of(task)
+    _, model, method, run, record, work = task_of(task)
     mode = run.mode
     recall_sides(model, run)
     direction = model.direction[fired]
     beyond = direction if direction != 0 else -run.side[fired]
     land_beyond(model, run, fired, beyond, stop_cycle, stop_phase, work)
     flowed = Arrival(FLOWED, mode, NO_TRANSITION)
-    take_sides(model, run, mode, run.phase, run.y, flowed, sides_of(run), work)
+    take_sides(model, method, run, mode, run.phase, run.y, flowed, sides_of(run), work)
     touched = has_only_touched(model, run, record, fired, beyond, work)
     run.side[fired] = beyond
     if run.on_guard[fired] == 0:
@@ -239,7 +241,7 @@ def first_in_order(task, fired, stop_cycle, stop_phase):
         other = model.outgoing[slot]
         if run.due[other] == 1 and other != fired:
             land_beyond(model, run, other, run.side[other], stop_cycle, stop_phase, work)
-    chosen = first_due(model, run, work)
+    chosen = first_due(model, method, run, work)
     if touched:
         run.side[fired] = -beyond
     elif chosen == NO_TRANSITION:

@@ -418,7 +418,7 @@ class Parts(Structure):
     """
 
     runge_kutta_step: function(Pair(REAL), Task, REAL)
-    enter: function(INTEGER, Model, Run, Work)
+    enter: function(INTEGER, Model, Method, Run, Work)
     rests_on_guard: function(TRUTH, Task)
     arrived: function(INTEGER, Task)
     keep_apart: function(None, Model, Run, INTEGER, INTEGER, MATRIX)
