@@ -101,7 +101,8 @@ class Model(Structure):
     guard; ``root`` is the order of the root that the series of a mode hold for its guards. ``field_before``
     and ``field_behind`` are the numbers of the fields at the crossing of a guard, on its two sides.
     ``timed`` is 1 for a mode whose field or one of whose guards may depend on time, ``timed_jump`` for a
-    transition whose guard or reset may. ``jumping_reset`` is 1 for one whose reset may jump,
+    transition whose guard or reset may. ``keeps_state`` is 1 for a transition whose reset is the identity,
+    ``jumping_reset`` for one whose reset may jump,
     ``read_by (modes, n)`` says what depends on a component besides itself,
     ``conditional`` for a mode that is left under conditions.
     ``tangent_start`` is the first column of tangent vectors in series, ``tangent_columns`` how many four of
@@ -168,6 +169,7 @@ class Model(Structure):
     timed: INDICES
     timed_jump: INDICES
     read_by: INDEX_MATRIX
+    keeps_state: INDICES
     jumping_reset: INDICES
     conditional: INDICES
     tangent_start: INTEGER
