@@ -199,6 +199,7 @@ def enters_plainly(model, run, fired, target, x, work):
     That guard leaves zero by its speed, to its near side. The sides go to ``run.rehearsal``.
     """
     t, n = run.phase, model.dimension
+    run.speed_behind = run.acceleration_behind = 0.0
     for slot in range(model.first_outgoing[target], model.first_outgoing[target + 1]):
         other = model.outgoing[slot]
         direction = model.direction[other]
@@ -220,6 +221,8 @@ def enters_plainly(model, run, fired, target, x, work):
             if not (steady and -direction * speed > CLEAR * drift and abs(speed) < math.inf):
                 return False
             run.rehearsal[1, other] = BY_SPEED
+            if other == fired:
+                run.speed_behind, run.acceleration_behind = speed, bend
         elif not -direction * value > CLEAR * band:
             return False
     return True
