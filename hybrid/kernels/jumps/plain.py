@@ -14,7 +14,6 @@ from hybrid.kernels.arithmetic.tangent import STRAINED, multiply, strain_of_squa
 from hybrid.kernels.events.guards import (
     LEFT_BEHIND,
     acceleration_along,
-    guard_speed,
     guard_value,
     rounding_band,
 )
@@ -213,7 +212,6 @@ def enters_plainly(model, run, fired, target, x, work):
             speed = work.gradient[n]
             for i in range(n):
                 speed += work.gradient[i] * work.field_after[i]
-            for i in range(n):
                 work.field[i] = work.field_after[i]
             drift = speed_rounding(model, run, other, target, t, x, work)
             bend = acceleration(model, other, target, t, x, work)
@@ -237,15 +235,17 @@ def jump_plainly(task, fired):
         return False
     parameters = model.parameters
     model.field(mode, t, run.y, parameters, work.field)
-    transversality = guard_speed(model, fired, t, run.y, work.field, work.gradient)
+    model.guard_gradient(fired, t, run.y, parameters, work.gradient)
     keeps = mode != target and model.keeps_state[fired] == 1
     after = run.y if keeps else work.new
     if not keeps:
         model.reset(fired, t, run.y, parameters, after)
     model.field(target, t, after, parameters, work.field_after)
-    total = abs(transversality)
+    transversality, total = work.gradient[n], 0.0
     for i in range(n):
+        transversality += work.gradient[i] * work.field[i]
         total += abs(after[i]) + abs(work.field_after[i])
+    total += abs(transversality)
     if not (total < math.inf and transversality != 0.0):
         return False
     asked = tangents > 0 or record.jump_phase.shape[0] > 0
@@ -271,12 +271,11 @@ def jump_plainly(task, fired):
         restitution = impulse_of(model, run, fired, transversality, work, work.settled)
     for i in range(n):
         work.error[i] = run.scale[i]
+        run.scale[i] = max(run.scale[i], abs(after[i]))
     if mode != target and not keeps:
         if tangents == 0:
             model.reset_jacobian(fired, t, run.y, parameters, work.reset_jacobian)
         carry_sizes(model, run, work)
-    for i in range(n):
-        run.scale[i] = max(run.scale[i], abs(after[i]))
     if not enters_plainly(model, run, fired, target, after, work):
         for i in range(n):
             run.scale[i] = work.error[i]
