@@ -222,6 +222,7 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
         ),
         timed_reset=tuple(not is_free(reset.expressions, (symbols.t,)) for reset in resets),
         read_by=readers(system, fields, guards, conditions, resets, symbols),
+        keeps_state=tuple(reset.expressions == [*symbols.x] for reset in resets),
         jumping_reset=tuple(
             reset.expressions is None or bool(jumps_of(reset.expressions, (symbols.t, *symbols.x)))
             for reset in resets

@@ -157,6 +157,8 @@ class Emitted:
     read_by
         By mode and component: BY_GUARD if a guard or a condition depends on it, BY_FLOW if another rate or
         another component of a reset does, else BY_NOTHING, as for a counter.
+    keeps_state
+        By transition: whether its reset is proved to be the identity.
     jumping_reset
         By transition: whether its reset is not proved to be continuous.
     steep
@@ -197,6 +199,7 @@ class Emitted:
     timed_guard: tuple[bool, ...]
     timed_reset: tuple[bool, ...]
     read_by: tuple[tuple[int, ...], ...] = attrs.field(metadata=FOR_KERNELS)
+    keeps_state: tuple[bool, ...] = attrs.field(metadata=FOR_KERNELS)
     jumping_reset: tuple[bool, ...] = attrs.field(metadata=FOR_KERNELS)
     steep: tuple[str, ...]
     steep_inside: tuple[str, ...]

@@ -222,6 +222,9 @@ def keep_scale(model, run, on_guard, t, work):
     guard, the rounding of the step may be a few times that of the state.
     """
     fired = run.pending
+    bent = model.propagator[run.mode] == RUNGE_KUTTA and model.affine_guard[fired] == 0
+    if not (on_guard or bent):
+        return
     value = abs(guard_value(model, fired, t, run.y, work.scalar))
     model.guard_gradient(fired, t, run.y, model.parameters, work.gradient)
     band = rounding_band(model, run, fired, t, run.y, work)
@@ -229,7 +232,6 @@ def keep_scale(model, run, on_guard, t, work):
         for i in range(model.dimension):
             run.scale[i] = max(run.scale[i], work.scale_before[i])
         band = rounding_band(model, run, fired, t, run.y, work)
-    bent = model.propagator[run.mode] == RUNGE_KUTTA and model.affine_guard[fired] == 0
     if bent and band < value <= MOST_ROUNDING * band:
         for i in range(model.dimension):
             run.scale[i] *= 2.0 * value / band

@@ -171,7 +171,7 @@ def called(compiled):
 
 
 def _words(argument):
-    """The words of an argument: a number, or an array's owner, sizes and data address."""
+    """The words of an argument: a number, or an array's address and lengths."""
     if not isinstance(argument, np.ndarray):
         return [argument]
-    return [0, 0, argument.size, argument.itemsize, argument.ctypes.data, *argument.shape, *argument.strides]
+    return [argument.ctypes.data, *argument.shape]

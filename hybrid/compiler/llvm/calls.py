@@ -20,8 +20,9 @@ from hybrid.compiler.llvm.columns import (
 )
 from hybrid.compiler.llvm.doubled import write_divided_dot_product
 from hybrid.compiler.llvm.registers import four, write_down, write_row
+from hybrid.compiler.llvm.waves import sine
 from hybrid.kernels.instructions.loops import declared
-from hybrid.kernels.instructions.registers import everywhere, read, write
+from hybrid.kernels.instructions.registers import everywhere, read, vector_of, write
 from hybrid.kernels.types.codes import HEAD, NARROW
 
 NUMBER = ir.DoubleType()
@@ -129,16 +130,34 @@ def _table(builder: Any, p: Any, first: int, count: int, degree: int, order: int
     return total
 
 
+def _wave(name: str) -> Call:
+    """The sine or the cosine, as a function of the module."""
+
+    def write(builder: Any, x: Any) -> Any:
+        function = builder.module.globals.get(name)
+        if function is None:
+            function = ir.Function(builder.module, ir.FunctionType(NUMBER, [NUMBER]), name)
+            function.linkage = "internal"
+            body, place = ir.IRBuilder(function.append_basic_block("body")), ir.IntType(32)(0)
+            register = body.insert_element(vector_of(1)(ir.Undefined), function.args[0], place)
+            body.ret(body.extract_element(sine(body, register, shift=int(name == "cosine")), place))
+        return builder.call(function, [x])
+
+    return Call(write, on_numbers=True)
+
+
 IN_LIBM = (
     "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cosh", "erf", "erfc", "expm1", "hypot",
     "log1p", "sinh", "tan", "tanh",
 )  # fmt: skip
-IN_LLVM = ("cos", "copysign", "exp", "log", "log10", "log2", "pow", "sin", "sqrt")
+IN_LLVM = ("copysign", "exp", "log", "log10", "log2", "pow", "sqrt")
 
 CALLS = {
     **{name: _of_libm(name) for name in IN_LIBM},
     **{name: _of_llvm(name) for name in IN_LLVM},
     **{f"np.{name}": _of_llvm(name) for name in ("floor", "ceil", "trunc", "rint")},
+    "sin": _wave("sine"),
+    "cos": _wave("cosine"),
     "abs": _of_llvm("fabs"),
     "max": Call(_largest, on_numbers=True),
     "np.fmod": Call(lambda builder, a, b: builder.frem(a, b), on_numbers=True),

@@ -19,28 +19,18 @@ from hybrid.compiler.statements.code import KNOWN, LoweringError
 from hybrid.kernels.instructions.loops import loop
 from hybrid.kernels.instructions.registers import Matrix, everywhere, vector_of
 from hybrid.kernels.types.codes import NARROW
+from hybrid.kernels.types.numba_door.arrays import array_kind, parts_of
 from hybrid.kernels.types.numba_door.builder import Builder
 
 TRUTH = ir.IntType(1)
 ADDRESS = ir.PointerType()
 LANES = vector_of(NARROW)
-# Numba's structure of an array of floats: memory info, parent, number of items, bytes per item, data, shape,
+ARRAYS = {axes: array_kind(axes) for axes in (1, 2)}
+# Numba's structure of a vector of floats: memory info, parent, number of items, bytes per item, data, shape,
 # strides.
-ARRAYS = {
-    axes: ir.LiteralStructType(
-        [
-            ADDRESS,
-            ADDRESS,
-            WHOLE,
-            WHOLE,
-            ADDRESS,
-            ir.ArrayType(WHOLE, axes),
-            ir.ArrayType(WHOLE, axes),
-        ]
-    )
-    for axes in (1, 2)
-}
-DATA, SHAPE = 4, 5
+NUMBA_ARRAY = ir.LiteralStructType(
+    [ADDRESS, ADDRESS, WHOLE, WHOLE, ADDRESS, ir.ArrayType(WHOLE, 1), ir.ArrayType(WHOLE, 1)]
+)
 
 
 @attrs.frozen
@@ -148,8 +138,7 @@ class Body:
             self.values[name] = argument if kind not in ARRAYS else self._array_argument(kind, argument)
 
     def _array_argument(self, axes: int, argument: Any) -> Vector | Matrix:
-        data = self.builder.extract_value(argument, DATA)
-        sizes = [self.builder.extract_value(argument, [SHAPE, axis]) for axis in range(axes)]
+        data, sizes = parts_of(self.builder, argument, axes)
         return Vector(data, sizes[0]) if axes == 1 else Matrix(self.builder, data, sizes[1])
 
     def write(self, cases: Sequence[Any]) -> None:
@@ -438,20 +427,26 @@ class Body:
         return call(self.builder, *arguments)
 
     def _own_call(self, function: OwnFunction, terms: Sequence[Any]) -> tuple[Any, ...]:
-        """The numbers that a function of the user writes; array arguments are passed on unchanged."""
-        arguments = [self.value(term) if type(term) is int else self.arguments[term[1]] for term in terms]
+        """The numbers that a function of the user writes."""
         numbers = self.front.alloca(NUMBER, WHOLE(function.size))
-        row = ARRAYS[1](ir.Undefined)
-        size, width = WHOLE(function.size), WHOLE(8)
-        nobody = ADDRESS(None)
-        for place, part in enumerate((nobody, nobody, size, width, numbers)):
-            row = self.builder.insert_value(row, part, place)
-        for place, part in ((SHAPE, size), (SHAPE + 1, width)):
-            row = self.builder.insert_value(row, part, [place, 0])
-        arguments.append(row)
+        given = [self.value(term) if type(term) is int else self.values[term[1]] for term in terms]
+        arguments = [
+            self._for_numba(each) if isinstance(each, Vector) else each
+            for each in (*given, Vector(numbers, WHOLE(function.size)))
+        ]
         self._called(WHOLE(function.address), arguments)
         places = [self.builder.gep(numbers, [WHOLE(i)], source_etype=NUMBER) for i in range(function.size)]
         return tuple(self.builder.load(place, typ=NUMBER) for place in places)
+
+    def _for_numba(self, vector: Vector) -> Any:
+        """An array as a function takes it that numba has compiled."""
+        parts = (ADDRESS(None), ADDRESS(None), vector.length, WHOLE(8), vector.data)
+        array = NUMBA_ARRAY(ir.Undefined)
+        for place, part in enumerate(parts):
+            array = self.builder.insert_value(array, part, place)
+        for place, part in enumerate((vector.length, WHOLE(8)), len(parts)):
+            array = self.builder.insert_value(array, part, [place, 0])
+        return array
 
     def _called(self, address: Any, arguments: Sequence[Any]) -> None:
         """A call of machine code of this process; llvmlite still asks its address for the signature."""

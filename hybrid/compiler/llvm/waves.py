@@ -1,4 +1,4 @@
-"""Sines and cosines of whole registers."""
+"""Sines and cosines of whole registers; a number is a register of one."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from hybrid.kernels.types.codes import (
 )
 from hybrid.kernels.types.kinds import INTEGER, MATRIX
 from hybrid.kernels.types.layout import Model, Run
-from hybrid.kernels.types.options import KERNEL, exported
+from hybrid.kernels.types.options import INLINE, KERNEL, exported
 
 # A vector that is shorter than this share of the terms that make it up along itself is only rounding.
 COLLAPSED = 1e-13
@@ -185,6 +185,12 @@ def strain(matrix, n, log_determinant):
     for i in range(n):
         for j in range(n):
             square += matrix[i, j] * matrix[i, j]
+    return strain_of_square(square, n, log_determinant)
+
+
+@njit(**INLINE)
+def strain_of_square(square, n, log_determinant):
+    """``strain`` of a matrix whose entries have this sum of squares."""
     return 0.5 * n * math.log(square / n) - log_determinant if square > 0.0 else math.inf
 
 

@@ -187,9 +187,8 @@ def is_grazing(model, method, run, transition, transversality, work):
 
 
 @njit(**KERNEL)
-def judge(model, run, work):
+def judge(run, largest):
     """Store the largest entry of all saltation matrices so far, and count those that are not finite."""
-    largest = largest_entry(model, work)
     run.largest_saltation = max(run.largest_saltation, largest)
     if not largest < math.inf:
         run.singular_jumps += 1
@@ -306,7 +305,7 @@ def jump(task, transition):
         map_of_instant(run, n, work.saltation)
         assume_sizes(model, work)
     if tangents > 0:
-        judge(model, run, work)
+        judge(run, largest_entry(model, work))
         if locked:
             restore_tangents(run, n, tangents)
         grown = carry_tangents(model, run, tangents, task.orthonormal != 0, kind == GRAZING, work)

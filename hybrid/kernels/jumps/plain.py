@@ -6,14 +6,14 @@ has been changed.
 """
 
 import math
+from typing import NamedTuple
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.tangent import STRAINED, multiply, strain
+from hybrid.kernels.arithmetic.tangent import STRAINED, multiply, strain_of_square
 from hybrid.kernels.events.guards import (
     LEFT_BEHIND,
     acceleration_along,
-    guard_speed,
     guard_value,
     rounding_band,
 )
@@ -30,7 +30,7 @@ from hybrid.kernels.types.codes import (
     RUNGE_KUTTA,
     TRANSVERSE,
 )
-from hybrid.kernels.types.kinds import INTEGER, TRUTH
+from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH
 from hybrid.kernels.types.layout import Task
 from hybrid.kernels.types.options import INLINE, exported
 from hybrid.kernels.types.task import task_of
@@ -65,10 +65,24 @@ def may_be_plain(model, run, fired, tangents):
     return True
 
 
+class Saltation(NamedTuple):
+    """What is asked of a saltation matrix: ``log |det|``, the sum of its squares, its largest entry.
+
+    The sum and the largest entry leave out counters.
+    """
+
+    log_determinant: REAL
+    square: REAL
+    largest: REAL
+
+
+NO_MATRIX = Saltation(0.0, 0.0, 0.0)
+
+
 @njit(**INLINE)
 def saltation_of(model, fired, transversality, work):
-    """The saltation matrix from the rates before and after; ``work.reset_jacobian`` is current."""
-    n = model.dimension
+    """The saltation matrix into ``work.saltation``; ``work.reset_jacobian`` is current."""
+    n, square, largest = model.dimension, 0.0, 0.0
     for i in range(n):
         kick = work.field_after[i] - work.reset_jacobian[i, n]
         for j in range(n):
@@ -76,16 +90,66 @@ def saltation_of(model, fired, transversality, work):
         kick /= transversality
         for j in range(n):
             work.saltation[i, j] = work.reset_jacobian[i, j] + kick * work.gradient[j]
+        for j in range(model.controlled if i < model.controlled else 0):
+            square += work.saltation[i, j] * work.saltation[i, j]
+            largest = max(largest, abs(work.saltation[i, j]))
+    return Saltation(log_determinant_of(work.saltation, work.jacobian, n, largest), square, largest)
 
 
 @njit(**INLINE)
-def log_determinant_of(matrix, scratch, n):
-    """``log |det|`` of a matrix; minus infinity if a pivot may be rounding, or the product is no float."""
-    total, largest = 1.0, 0.0
+def shear_of(model, transversality, work):
+    """The saltation matrix ``I + kick slope`` of a jump that keeps the state.
+
+    ``kick (n,)``, the change of the field per transversality, goes to ``work.trial``, and ``slope (n,)``, the
+    gradient of the guard, to ``work.second_error``. The determinant is ``1 + slope kick``.
+    """
+    controlled, determinant, terms, square, largest = model.controlled, 1.0, 1.0, 0.0, 0.0
+    for i in range(model.dimension):
+        kick, slope = (work.field_after[i] - work.field[i]) / transversality, work.gradient[i]
+        work.trial[i], work.second_error[i] = kick, slope
+        determinant += kick * slope
+        terms += abs(kick * slope)
+    for i in range(controlled):
+        kick = work.trial[i]
+        if kick == 0.0:
+            square, largest = square + 1.0, max(largest, 1.0)
+            continue
+        for j in range(controlled):
+            entry = kick * work.second_error[j] + (1.0 if i == j else 0.0)
+            square, largest = square + entry * entry, max(largest, abs(entry))
+    known = abs(determinant) > LEAST_PIVOT * terms and terms < math.inf
+    return Saltation(math.log(abs(determinant)) if known else -math.inf, square, largest)
+
+
+@njit(**INLINE)
+def write_shear(model, work):
+    """The matrix of ``shear_of`` into ``work.saltation``, for the record."""
+    for i in range(model.dimension):
+        for j in range(model.dimension):
+            work.saltation[i, j] = work.trial[i] * work.second_error[j] + (1.0 if i == j else 0.0)
+
+
+@njit(**INLINE)
+def shear(y, n, tangents, kick, slope):
+    """Add to each of the tangent vectors ``v`` in ``y (n (1 + k),)`` its ``kick slope v``."""
+    for start in range(n, n * (1 + tangents), n):
+        delay = 0.0
+        for i in range(n):
+            delay += slope[i] * y[start + i]
+        for i in range(n):
+            y[start + i] += delay * kick[i]
+
+
+@njit(**INLINE)
+def log_determinant_of(matrix, scratch, n, largest):
+    """``log |det|`` of a matrix; minus infinity if a pivot may be rounding, or the product is no float.
+
+    The ``largest`` entry is known.
+    """
+    total = 1.0
     for i in range(n):
         for j in range(n):
             scratch[i, j] = matrix[i, j]
-            largest = max(largest, abs(matrix[i, j]))
     for c in range(n):
         pivot = c
         for i in range(c + 1, n):
@@ -105,14 +169,14 @@ def log_determinant_of(matrix, scratch, n):
 
 
 @njit(**INLINE)
-def acceleration(model, other, mode, t, work):
-    """The acceleration of a guard at ``work.new``: field, gradient and Jacobian in ``work`` are current."""
+def acceleration(model, other, mode, t, x, work):
+    """The acceleration of a guard at ``x (n,)``: field, gradient and Jacobian in ``work`` are current."""
     total = acceleration_along(model, mode, work)
     if model.affine_guard[other] == 1:
         return total
     for i in range(model.dimension):
         work.state[i] = work.field[i]
-    model.guard_curvature(other, t, work.new, model.parameters, work.state)
+    model.guard_curvature(other, t, x, model.parameters, work.state)
     return total + work.state[0]
 
 
@@ -128,18 +192,19 @@ def carry_sizes(model, run, work):
 
 
 @njit(**INLINE)
-def enters_plainly(model, run, fired, target, work):
-    """Whether the state ``work.new`` is clear of all guards of a mode but of the surface just crossed.
+def enters_plainly(model, run, fired, target, x, work):
+    """Whether the state ``x (n,)`` is clear of all guards of a mode but of the surface just crossed.
 
     That guard leaves zero by its speed, to its near side. The sides go to ``run.rehearsal``.
     """
     t, n = run.phase, model.dimension
+    run.speed_behind = run.acceleration_behind = 0.0
     for slot in range(model.first_outgoing[target], model.first_outgoing[target + 1]):
         other = model.outgoing[slot]
         direction = model.direction[other]
-        value = guard_value(model, other, t, work.new, work.scalar)
-        model.guard_gradient(other, t, work.new, model.parameters, work.gradient)
-        band = rounding_band(model, run, other, t, work.new, work)
+        value = guard_value(model, other, t, x, work.scalar)
+        model.guard_gradient(other, t, x, model.parameters, work.gradient)
+        band = rounding_band(model, run, other, t, x, work)
         run.rehearsal[0, other], run.rehearsal[1, other] = -direction, 0
         if direction == 0:
             return False
@@ -147,14 +212,15 @@ def enters_plainly(model, run, fired, target, work):
             speed = work.gradient[n]
             for i in range(n):
                 speed += work.gradient[i] * work.field_after[i]
-            for i in range(n):
                 work.field[i] = work.field_after[i]
-            drift = speed_rounding(model, run, other, target, t, work.new, work)
-            bend = acceleration(model, other, target, t, work)
+            drift = speed_rounding(model, run, other, target, t, x, work)
+            bend = acceleration(model, other, target, t, x, work)
             steady = abs(bend) * band <= CHANGE * speed * speed
             if not (steady and -direction * speed > CLEAR * drift and abs(speed) < math.inf):
                 return False
             run.rehearsal[1, other] = BY_SPEED
+            if other == fired:
+                run.speed_behind, run.acceleration_behind = speed, bend
         elif not -direction * value > CLEAR * band:
             return False
     return True
@@ -169,27 +235,32 @@ def jump_plainly(task, fired):
         return False
     parameters = model.parameters
     model.field(mode, t, run.y, parameters, work.field)
-    transversality = guard_speed(model, fired, t, run.y, work.field, work.gradient)
-    model.reset(fired, t, run.y, parameters, work.new)
-    model.field(target, t, work.new, parameters, work.field_after)
-    total = abs(transversality)
+    model.guard_gradient(fired, t, run.y, parameters, work.gradient)
+    keeps = mode != target and model.keeps_state[fired] == 1
+    after = run.y if keeps else work.new
+    if not keeps:
+        model.reset(fired, t, run.y, parameters, after)
+    model.field(target, t, after, parameters, work.field_after)
+    transversality, total = work.gradient[n], 0.0
     for i in range(n):
-        total += abs(work.new[i]) + abs(work.field_after[i])
-    for i in range(n, n * (1 + tangents)):
-        total += abs(run.y[i])
+        transversality += work.gradient[i] * work.field[i]
+        total += abs(after[i]) + abs(work.field_after[i])
+    total += abs(transversality)
     if not (total < math.inf and transversality != 0.0):
         return False
     asked = tangents > 0 or record.jump_phase.shape[0] > 0
-    log_determinant, distortion = 0.0, 0.0
+    matrix, distortion = NO_MATRIX, 0.0
     if tangents > 0:
         if model.affine_guard[fired] == 0 and finds_surface(model, fired, t, run.y, transversality, work):
             return False
-        model.reset_jacobian(fired, t, run.y, parameters, work.reset_jacobian)
-        saltation_of(model, fired, transversality, work)
-        log_determinant = log_determinant_of(work.saltation, work.jacobian, n)
-        if not log_determinant > -math.inf:
+        if keeps:
+            matrix = shear_of(model, transversality, work)
+        else:
+            model.reset_jacobian(fired, t, run.y, parameters, work.reset_jacobian)
+            matrix = saltation_of(model, fired, transversality, work)
+        if not matrix.log_determinant > -math.inf:
             return False
-        distortion = run.strain + strain(work.saltation, model.controlled, log_determinant)
+        distortion = run.strain + strain_of_square(matrix.square, model.controlled, matrix.log_determinant)
         if task.orthonormal != 0 and not distortion < STRAINED:
             return False
     judged = asked and not ends_own_flight(model, run, fired, transversality)
@@ -200,22 +271,26 @@ def jump_plainly(task, fired):
         restitution = impulse_of(model, run, fired, transversality, work, work.settled)
     for i in range(n):
         work.error[i] = run.scale[i]
-    if mode != target:
+        run.scale[i] = max(run.scale[i], abs(after[i]))
+    if mode != target and not keeps:
         if tangents == 0:
             model.reset_jacobian(fired, t, run.y, parameters, work.reset_jacobian)
         carry_sizes(model, run, work)
-    for i in range(n):
-        run.scale[i] = max(run.scale[i], abs(work.new[i]))
-    if not enters_plainly(model, run, fired, target, work):
+    if not enters_plainly(model, run, fired, target, after, work):
         for i in range(n):
             run.scale[i] = work.error[i]
         return False
-    remember_jump(run, record, fired, transversality, TRANSVERSE, tangents > 0, work.new, work)
+    if keeps and tangents > 0 and record.jump_phase.shape[0] > 0:
+        write_shear(model, work)
+    remember_jump(run, record, fired, transversality, TRANSVERSE, tangents > 0, after, work)
     if tangents > 0:
-        judge(model, run, work)
-        run.log_determinant += log_determinant
+        judge(run, matrix.largest)
+        run.log_determinant += matrix.log_determinant
         run.strain = distortion
-        multiply(work.saltation, run.y, n, tangents, work.state, work.rounding)
+        if keeps:
+            shear(run.y, n, tangents, work.trial, work.second_error)
+        else:
+            multiply(work.saltation, run.y, n, tangents, work.state, work.rounding)
     if mode == target:
         run.restitution = restitution
         for i in range(n):
@@ -223,6 +298,6 @@ def jump_plainly(task, fired):
     run.last_kind, run.last_transversality, run.locked = TRANSVERSE, transversality, 0
     run.due[fired] = 0
     postpone_map(run, n)
-    move(model, run, fired, target, work.new)
+    move(model, run, fired, target, after)
     run.clear = 1
     return True

@@ -27,6 +27,21 @@ def far_side(model, run, transition):
 
 
 @njit(**KERNEL)
+def motion_behind(model, run, transition, work):
+    """Speed and acceleration of the guard right after an impact on it; 0 if the reset leaves the guard."""
+    mode, t, x = run.mode, run.phase, run.y
+    if run.clear == 1:
+        return run.speed_behind, run.acceleration_behind
+    model.field(mode, t, x, model.parameters, work.field)
+    speed = guard_speed(model, transition, t, x, work.field, work.gradient)
+    # No chatter begins with a reset that leaves the guard.
+    value = guard_value(model, transition, t, x, work.scalar)
+    if not abs(value) <= rounding_band(model, run, transition, t, x, work):
+        return 0.0, 0.0
+    return speed, guard_acceleration(model, run, transition, mode, t, x, work)
+
+
+@njit(**KERNEL)
 def series_of_impacts(model, run, transition, work):
     """The series of impacts on one guard, known once two have followed each other.
 
@@ -34,17 +49,12 @@ def series_of_impacts(model, run, transition, work):
     left.
     """
     n, ratio, side = model.dimension, run.restitution, -far_side(model, run, transition)
-    t, follows = run.phase, run.chatter_jumps + 1 == run.jumps and fired_before(run, 1) == transition
+    follows = run.chatter_jumps + 1 == run.jumps and fired_before(run, 1) == transition
     earlier, run.chattering = run.chattering if follows else 0, 0
     if not 0.0 < ratio < 1.0 or (run.jumps > 2 and not shortens(model, run, 1)):
         return NO_SERIES
-    model.field(run.mode, t, run.y, model.parameters, work.field)
-    speed = side * guard_speed(model, transition, t, run.y, work.field, work.gradient)
-    value = guard_value(model, transition, t, run.y, work.scalar)
-    # No chatter begins with a reset that leaves the guard.
-    if not abs(value) <= rounding_band(model, run, transition, t, run.y, work):
-        return NO_SERIES
-    pull = -side * guard_acceleration(model, run, transition, run.mode, t, run.y, work)
+    speed, acceleration = motion_behind(model, run, transition, work)
+    speed, pull = side * speed, -side * acceleration
     if not (pull > 0.0 and speed > 0.0):
         return NO_SERIES
     span, before, flight = 2.0 * speed / (pull * (1.0 - ratio)), run.trail[LIMIT, n], run.stay[run.mode]

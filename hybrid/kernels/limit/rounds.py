@@ -64,8 +64,10 @@ def time_left_of_rounds(model, run, turn, back):
     """
     d0 = time_before(model, run, back, back + turn)
     d1 = time_before(model, run, back + turn, back + 2 * turn)
+    if not 0.0 < d0 < d1:
+        return 0.0, 1.0
     d2 = time_before(model, run, back + 2 * turn, back + 3 * turn)
-    if not 0.0 < d0 < d1 < d2:
+    if not d1 < d2:
         return 0.0, 1.0
     ratio = d0 / d1
     if abs(ratio - d1 / d2) > STEADY * (1.0 - ratio):

@@ -70,4 +70,6 @@ NUMBERS = (
     "stretch_left",
     "entry_phase",
     "entry_low",
+    "speed_behind",
+    "acceleration_behind",
 )

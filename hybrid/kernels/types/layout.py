@@ -103,7 +103,8 @@ class Model(Structure):
     guard; ``root`` is the order of the root that the series of a mode hold for its guards. ``field_before``
     and ``field_behind`` are the numbers of the fields at the crossing of a guard, on its two sides.
     ``timed`` is 1 for a mode whose field or one of whose guards may depend on time, ``timed_jump`` for a
-    transition whose guard or reset may. ``jumping_reset`` is 1 for one whose reset may jump,
+    transition whose guard or reset may. ``keeps_state`` is 1 for a transition whose reset is the identity,
+    ``jumping_reset`` for one whose reset may jump,
     ``read_by (modes, n)`` says what depends on a component besides itself,
     ``conditional`` for a mode that is left under conditions.
     ``tangent_start`` is the first column of tangent vectors in series, ``tangent_columns`` how many four of
@@ -170,6 +171,7 @@ class Model(Structure):
     timed: INDICES
     timed_jump: INDICES
     read_by: INDEX_MATRIX
+    keeps_state: INDICES
     jumping_reset: INDICES
     conditional: INDICES
     tangent_start: INTEGER
@@ -237,8 +239,9 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
       The mode was entered in the period ``entry_cycle`` at ``entry_phase``, and ``entry_low`` of rounding.
       ``turned``: jumps at ticks that changed which transition of their clock may fire, last to ``turned_to``.
     - ``clear``: 1 if the last jump has left the state clear of all guards but its own, whose sides are in
-      ``rehearsal``; ``distant``: 1 if the last step has proved that all guards are far from zero at its end;
-      ``crossings``: 1 if it has found one crossing, which is certain.
+      ``rehearsal``; after an impact ``speed_behind`` and ``acceleration_behind`` are then those of its guard,
+      or 0 if the reset has left the guard. ``distant``: 1 if the last step has proved that all guards are far
+      from zero at its end; ``crossings``: 1 if it has found one crossing, which is certain.
     - ``horizon``: how long the run takes, 0 if that is not known at its start; ``longest_step`` in time so
       far; ``lateness``: the largest change that the rounding of the time made, in tolerances;
       ``unknown_time``: the largest error that the time of a jump may have where a guard came to rest, and the

@@ -4,16 +4,14 @@ from inspect import getmembers
 
 import numpy as np
 import pytest
-from numba import cfunc
 
 import models
 from hybrid.compiler.cache.loader import load_kernels
-from hybrid.kernels.types.kinds import REAL, VECTOR
-from hybrid.kernels.types.numba_door.numba_types import signature_of
 from hybrid.system.derivatives import evaluate
 from lyapunov.study import kernels
 from lyapunov.study.ode23s import parameters_of, scratch
 from lyapunov.study.places import EVALUATIONS, F0, INCREMENTS, THRESHOLDS
+from tests.lyapunov.study.compiled import compiled
 
 
 @pytest.fixture(autouse=True)
@@ -142,12 +140,12 @@ def test_growth_rates_of_a_linear_field_are_its_eigenvalues():
         for i in range(0, 6, 2):
             out[i], out[i + 1] = -0.25 * y[i], -2.0 * y[i + 1]
 
-    field = cfunc(signature_of(None, REAL, VECTOR, VECTOR, VECTOR))(decay)
+    field = compiled(decay)
     y = np.array([1.0, 1.0, 1.0, 0.0, 0.5, 1.0])
     rates = np.empty((3, 2))
     work, counters = scratch(6)
-    compiled = load_kernels("lyapunov.study.kernels")
-    done = compiled.growth_rates(field, np.zeros(0), 0.0, 1.5, y, 1e-6, 1e-9, rates, work, counters)
+    kernels = load_kernels("lyapunov.study.kernels")
+    done = kernels.growth_rates(field, np.zeros(0), 0.0, 1.5, y, 1e-6, 1e-9, rates, work, counters)
     assert done == 3
     np.testing.assert_allclose(rates[1:], [[-0.25, -2.0]] * 2, atol=1e-4)
     np.testing.assert_allclose(y[:2], np.exp([-0.25 * 4.5, -2.0 * 4.5]), rtol=1e-3)

@@ -7,22 +7,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from numba import cfunc
 
 import models
 from hybrid import simulate
-from hybrid.kernels.types.kinds import REAL, VECTOR
-from hybrid.kernels.types.numba_door.numba_types import signature_of
 from lyapunov.study import ode23s
 from lyapunov.study.ode23s import Ode23s, StepTooSmall
 from lyapunov.study.runs import STARTS
+from tests.lyapunov.study.compiled import compiled
 
 LINEAR = np.array([[-0.5, 3.0, 0.0], [-3.0, -0.5, 1.0], [0.0, 0.0, -40.0]])
 SPAN = (0.0, 2.0)
-
-
-def compiled(function):
-    return cfunc(signature_of(None, REAL, VECTOR, VECTOR, VECTOR))(function)
 
 
 def linear(t, y, p, out):

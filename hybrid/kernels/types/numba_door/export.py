@@ -13,7 +13,9 @@ from numba.core import types
 from numba.core.compiler_lock import global_compiler_lock
 
 from hybrid.kernels.types.kinds import BY_WORDS, Pair, is_bundle, width_of
-from hybrid.kernels.types.numba_door.numba_types import array_in, numba_type, signature_of, word_in
+from hybrid.kernels.types.numba_door.arrays import array_kind, array_of_parts, parts_of
+from hybrid.kernels.types.numba_door.lowering import array_of
+from hybrid.kernels.types.numba_door.numba_types import numba_type, signature_of, word_in
 from hybrid.kernels.types.numba_door.part_compiler import WholeLibrary
 
 WORD = ir.IntType(64)
@@ -72,12 +74,19 @@ def _write_typed(context, module, name, described):
     result, arguments = described.restype, described.argtypes
     convention = context.call_conv
     called = ir.Function(module, convention.get_function_type(result, arguments), described.llvm_func_name)
-    kind = ir.FunctionType(
-        context.get_value_type(result), [context.get_value_type(each) for each in arguments]
-    )
-    function = ir.Function(module, kind, name)
+    kinds = [
+        array_kind(each.ndim) if isinstance(each, types.Array) else context.get_value_type(each)
+        for each in arguments
+    ]
+    function = ir.Function(module, ir.FunctionType(context.get_value_type(result), kinds), name)
     builder = ir.IRBuilder(function.append_basic_block("entry"))
-    _, value = convention.call_function(builder, called, result, arguments, function.args)
+    values = [
+        array_of(context, builder, kind, *parts_of(builder, each, kind.ndim))
+        if isinstance(kind, types.Array)
+        else each
+        for kind, each in zip(arguments, function.args, strict=True)
+    ]
+    _, value = convention.call_function(builder, called, result, arguments, values)
     builder.ret(value)
     return function
 
@@ -107,7 +116,8 @@ def _argument(context, builder, table, place, kind):
         return word_in(context, builder, table, place + offset, llvm_type)
 
     if isinstance(kind, types.Array):
-        return array_in(context, builder, kind, word)
+        lengths = [word(1 + axis, WORD) for axis in range(kind.ndim)]
+        return array_of_parts(builder, word(0, ir.PointerType()), lengths)
     if kind == types.boolean:
         return builder.trunc(word(0, WORD), ir.IntType(1))
     return word(0, context.get_value_type(kind))

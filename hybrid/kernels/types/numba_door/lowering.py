@@ -12,6 +12,8 @@ from numba.core import types
 from numba.core.ir import UNDEFINED, Assign
 from numba.core.lowering import Lower
 
+from hybrid.kernels.types.numba_door.arrays import array_of_parts
+
 # Where numba keeps the parts of an array, of a range and of its iterator.
 OWNERS = (0, 1)
 ITEMS, ITEM_SIZE, DATA, SHAPE, STRIDES = 2, 3, 4, 5, 6
@@ -50,6 +52,14 @@ def _without_owner(form, ndim):
     strides = [llvm.Constant(WORD, llvm.Undefined)] * (ndim - 1) + [WORD(NUMBER)]
     parts[STRIDES] = llvm.Constant(form.elements[STRIDES], strides)
     return llvm.Constant(form, parts)
+
+
+def handed_over(builder, kind, value):
+    """A value as a function of machine code takes it."""
+    if not isinstance(kind, types.Array):
+        return value
+    lengths = [builder.extract_value(value, (SHAPE, axis)) for axis in range(kind.ndim)]
+    return array_of_parts(builder, builder.extract_value(value, DATA), lengths)
 
 
 class KernelLowering(Lower):
@@ -238,6 +248,13 @@ class KernelLowering(Lower):
         # Kernels raise nothing, so nobody looks at what the call says of that.
         builder.call(function, [slot, convention._get_excinfo_argument(builder.function), *packed])
         return context.get_returned_value(builder, described.restype, builder.load(slot))
+
+    def _lower_call_ExternalFunctionPointer(self, fnty, expr, signature):
+        context, builder = self.context, self.builder
+        values = self.fold_call_args(fnty, signature, expr.args, expr.vararg, expr.kws)
+        handed = [handed_over(builder, *each) for each in zip(fnty.sig.args, values, strict=True)]
+        kind = llvm.FunctionType(context.get_value_type(fnty.sig.return_type), [each.type for each in handed])
+        return builder.call(builder.bitcast(self.loadvar(expr.func.name), kind.as_pointer()), handed)
 
     def lower_binop(self, resty, expr, op):
         """The value of an operator, by the signature that typing has found; numba looks for it again."""
