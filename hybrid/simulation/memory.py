@@ -21,6 +21,8 @@ from hybrid.simulation.periods import split_time
 
 # Deep enough for intervals halved down to rounding.
 ISOLATION_DEPTH = 64
+# Parts of a step on which a guard is judged by its leading powers: halves, quarters and eighths of it.
+PARTS = 8
 # Transitions remembered in the order in which they fired: enough to see which go round without end. A power
 # of two.
 RECENT = 64
@@ -186,7 +188,7 @@ def work_layout(method: Any, dimension: int, tangents: int, guards: int, columns
         "rounding": (4, n),
         "path": (degree + 3, n + guards),
         "polynomial": (width,),
-        "stack": (ISOLATION_DEPTH, width),
+        "stack": (PARTS, width),
         "intervals": (ISOLATION_DEPTH, 2),
         "systems": (n + coupled * (n + 1) + 4, coupled * n),
         "pivots": ((coupled + 1) * n,),

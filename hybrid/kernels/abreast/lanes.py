@@ -91,15 +91,18 @@ def come_aboard(lane, places, task, room, row):
 
 
 @njit(**KERNEL)
-def leave(lane, places, task, row):
-    """Write where a run is at the start of the step from a lane back to the run."""
+def leave(lane, places, task, took, row):
+    """Write where a run is at the start of the step from a lane back to the run.
+
+    The state there, with its sizes, is not asked for any more if the run ``took`` the step.
+    """
     model, run, method, series = task.model, task.run, task.method, task.work.series
     n, mode, order = model.dimension, run.mode, order_of(model, method, run.mode)
     first = places.numbers * ABREAST + row
     steps = int(lane[first + STEPS * ABREAST])
     if steps == 0:
         return
-    for i in range(places.parameters):
+    for i in range(0 if took else places.parameters):
         run.y[i] = lane[i * ABREAST + row]
     run.phase, run.phase_low = lane[first + T * ABREAST], lane[first + LOW * ABREAST]
     run.cycle += int(lane[first + CYCLE * ABREAST])

@@ -18,6 +18,7 @@ from hybrid.kernels.types.codes import (
     DONE,
     GO_ON,
     MAX_STEPS,
+    NO_MODE,
     NO_TRANSITION,
     READY,
     RUNGE_KUTTA,
@@ -85,9 +86,21 @@ def take_ashore(sea, task, row):
     return span
 
 
+@njit(**INLINE)
+def board(sea, crew, mode, row, r):
+    """Let a run into an empty lane of its mode."""
+    crew.aboard[mode, row] = r
+    task = task_at(crew.tasks[r])
+    places = places_in(task.model, task.tangents, crew.parameters, mode)
+    come_aboard(sea.lanes[mode], places, task, crew.rooms[r, 2], row)
+
+
 @njit(**KERNEL)
-def muster(parts, sea, crew, onward, r):
-    """Bring a run to where it takes its next step, and let it wait there; or to its end."""
+def muster(parts, sea, crew, onward, r, left, row):
+    """Bring a run to where it takes its next step, and let it wait there; or to its end.
+
+    A run that goes on in the mode that it has ``left`` goes back into its lane, in that ``row``.
+    """
     task = task_at(crew.tasks[r])
     while True:
         code, room = prepare(
@@ -105,6 +118,9 @@ def muster(parts, sea, crew, onward, r):
         crew.rooms[r, 0], crew.rooms[r, 1] = room.remains, room.until
         crew.rooms[r, 2], crew.rooms[r, 3] = room.all, room.knot
         crew.clocks[r] = room.clock
+        if queue == left:
+            board(sea, crew, left, row, r)
+            return
     crew.waiting[queue, crew.counts[queue]] = r
     crew.counts[queue] += 1
 
@@ -123,7 +139,7 @@ def step_alone(advance, parts, sea, crew, onward, r):
         if code != GO_ON:
             crew.codes[r] = code
             return
-    muster(parts, sea, crew, onward, r)
+    muster(parts, sea, crew, onward, r, NO_MODE, 0)
 
 
 @njit(**KERNEL)
@@ -133,11 +149,7 @@ def fill(sea, crew, mode):
     for row in range(ABREAST):
         if crew.aboard[mode, row] < 0 and waiting > 0:
             waiting -= 1
-            r = crew.waiting[mode, waiting]
-            crew.aboard[mode, row] = r
-            task = task_at(crew.tasks[r])
-            places = places_in(task.model, task.tangents, crew.parameters, mode)
-            come_aboard(sea.lanes[mode], places, task, crew.rooms[r, 2], row)
+            board(sea, crew, mode, row, crew.waiting[mode, waiting])
         if crew.aboard[mode, row] >= 0:
             bits |= 1 << row
     crew.counts[mode] = waiting
@@ -174,7 +186,7 @@ def go_ashore(parts, sea, crew, mode, row, took, went):
     task = task_at(crew.tasks[r])
     places = places_in(task.model, task.tangents, crew.parameters, mode)
     left = lane[(places.numbers + ROOM) * ABREAST + row]
-    leave(lane, places, task, row)
+    leave(lane, places, task, took, row)
     if not took:
         if (went >> row) & 1 and task.tangents > 0 and task.orthonormal != 0:
             task.run.unchecked -= 1
@@ -217,7 +229,7 @@ def step_together(parts, sea, crew, onward, mode):
         if code != GO_ON:
             crew.codes[r] = code
             continue
-        muster(parts, sea, crew, onward, r)
+        muster(parts, sea, crew, onward, r, mode, row)
 
 
 @exported(INTEGER, ADVANCE, Parts, Abreast, Crew, ONWARD)
@@ -234,7 +246,7 @@ def advance_abreast(advance, parts, sea, crew, onward):
             crew.codes[r] = onward(parts, task_at(crew.tasks[r]), crew, r, GO_ON)
             if crew.codes[r] != GO_ON:
                 continue
-            muster(parts, sea, crew, onward, r)
+            muster(parts, sea, crew, onward, r, NO_MODE, 0)
     alone = crew.aboard.shape[0]
     while crew.steps + crew.alone < crew.budget:
         # One at a time, and all those that are alone before the others, who wait for them.
