@@ -132,6 +132,7 @@ def crew_layout(runs: int, modes: int) -> Layout:
         "rooms": (runs, 4),
         "waiting": (modes + 1, runs),
         "counts": (modes + 1,),
+        "heads": (modes + 1,),
         "aboard": (modes, codes.ABREAST),
     }
     return Layout(Memory, shapes)

@@ -87,6 +87,15 @@ def take_ashore(sea, task, row):
 
 
 @njit(**INLINE)
+def next_waiting(crew, queue):
+    """The run that has waited longest, which waits no more: so all get on alike, and lanes stay full."""
+    r = crew.waiting[queue, crew.heads[queue]]
+    crew.heads[queue] = (crew.heads[queue] + 1) % crew.waiting.shape[1]
+    crew.counts[queue] -= 1
+    return r
+
+
+@njit(**INLINE)
 def board(sea, crew, mode, row, r):
     """Let a run into an empty lane of its mode."""
     crew.aboard[mode, row] = r
@@ -121,7 +130,7 @@ def muster(parts, sea, crew, onward, r, left, row):
         if queue == left:
             board(sea, crew, left, row, r)
             return
-    crew.waiting[queue, crew.counts[queue]] = r
+    crew.waiting[queue, (crew.heads[queue] + crew.counts[queue]) % crew.waiting.shape[1]] = r
     crew.counts[queue] += 1
 
 
@@ -145,14 +154,12 @@ def step_alone(advance, parts, sea, crew, onward, r):
 @njit(**KERNEL)
 def fill(sea, crew, mode):
     """Let runs that wait for a mode into its empty lanes; returns the bits of the lanes that are taken."""
-    bits, waiting = 0, crew.counts[mode]
+    bits = 0
     for row in range(ABREAST):
-        if crew.aboard[mode, row] < 0 and waiting > 0:
-            waiting -= 1
-            board(sea, crew, mode, row, crew.waiting[mode, waiting])
+        if crew.aboard[mode, row] < 0 and crew.counts[mode] > 0:
+            board(sea, crew, mode, row, next_waiting(crew, mode))
         if crew.aboard[mode, row] >= 0:
             bits |= 1 << row
-    crew.counts[mode] = waiting
     return bits
 
 
@@ -251,9 +258,7 @@ def advance_abreast(advance, parts, sea, crew, onward):
     while crew.steps + crew.alone < crew.budget:
         # One at a time, and all those that are alone before the others, who wait for them.
         if crew.counts[alone] > 0:
-            crew.counts[alone] -= 1
-            r = crew.waiting[alone, crew.counts[alone]]
-            step_alone(advance, parts, sea, crew, onward, r)
+            step_alone(advance, parts, sea, crew, onward, next_waiting(crew, alone))
             continue
         mode = fullest(crew)
         if mode < 0:

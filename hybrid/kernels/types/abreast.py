@@ -53,7 +53,8 @@ class Crew(Structure, counters=("parameters", "begun", "steps", "alone", "budget
     ``clocks (R,)`` are what is known of the next step of each.
 
     ``waiting (modes + 1, R)`` are the runs that wait for others in their mode, and in the last row those that
-    step alone, ``counts (modes + 1,)`` of them; ``aboard (modes, W)`` those that are in a lane, -1 for none.
+    step alone: ``counts (modes + 1,)`` of them, round the row from ``heads (modes + 1,)`` on; ``aboard
+    (modes, W)`` those that are in a lane, -1 for none.
     ``longest (modes,)`` is the number of steps after which a run leaves its lane. A model has so many
     ``parameters``; with ``begun`` 0 the runs have not been brought to their first steps. So many ``steps``
     have been taken abreast, and by runs ``alone``; a call ends when both have reached the ``budget``.
@@ -72,6 +73,7 @@ class Crew(Structure, counters=("parameters", "begun", "steps", "alone", "budget
     clocks: INDICES
     waiting: INDEX_MATRIX
     counts: INDICES
+    heads: INDICES
     aboard: INDEX_MATRIX
     longest: INDICES
 
