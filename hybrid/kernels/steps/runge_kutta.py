@@ -121,25 +121,25 @@ def affine_column(model, method, run, transition, column, h, path, work):
     cancel, unless the run knows that the guard has a speed.
     """
     n, rows, speeds, sizes = model.dimension, path.powers, work.speeds[0], work.speeds[1]
-    start = (
-        0.0
-        if run.on_guard[transition] > 0
-        else guard_value(model, transition, path.start, run.y, work.scalar)
-    )
+    start, share = guard_value(model, transition, path.start, run.y, work.scalar), ROUNDING_OF_STATE * EPSILON
+    start = 0.0 if run.on_guard[transition] > 0 else start
     model.guard_gradient(transition, path.start, run.y, model.parameters, work.gradient)
     for j in range(method.a.shape[0]):
         speeds[j], sizes[j] = 0.0, 0.0
         for i in range(n):
-            speeds[j] += work.gradient[i] * work.stages[j, i]
-            sizes[j] += abs(work.gradient[i] * work.stages[j, i])
+            # The step first: a column may be far smaller than its speed.
+            moved = h * work.stages[j, i] * work.gradient[i]
+            speeds[j] += moved
+            sizes[j] += share * abs(moved)
     rows[0, column], rows[path.degree + 2, column] = start, abs(start)
     for k in range(1, path.degree + 1):
         known = k == 1 and run.on_guard[transition] == BY_SPEED
-        total, terms = (work.gradient[n], abs(work.gradient[n])) if k == 1 else (0.0, 0.0)
+        total = h * work.gradient[n] if k == 1 else 0.0
+        noise = share * abs(total)
         for j in range(method.a.shape[0]):
             total += method.powers[k, j] * speeds[j]
-            terms += abs(method.powers[k, j]) * sizes[j]
-        rows[k, column] = h * total if known or abs(total) > ROUNDING_OF_STATE * EPSILON * terms else 0.0
+            noise += abs(method.powers[k, j]) * sizes[j]
+        rows[k, column] = 0.0 if abs(total) <= noise and not known else total
         rows[path.degree + 2, column] += abs(rows[k, column])
 
 
@@ -192,8 +192,13 @@ def find_event(task, h, interpolated):
             correction, first = reach_any(task, h)
             if first != NO_TRANSITION:
                 return 0.0, correction, first
+            # No shorter step tells more: what this one shows has happened.
             attempt_again(task, h)
-            return h, 0.0, NO_TRANSITION
+            interpolation_stages(model, method, mode, t, h, run.y, work)
+            path = path_of_attempt(model, method, run, h, work)
+            theta, fired, proved, _ = first_event(
+                attempts, model, method, run, path, True, ignored, touched, work
+            )
         if proved < min(theta, 1.0):
             attempt_again(task, proved * h)
             return proved * h, 0.0, NO_TRANSITION
