@@ -114,8 +114,20 @@ def loaded(module: str) -> SimpleNamespace:
 
 
 def compiled(module: str) -> bytes:
-    """Compile the kernels that a module exports; the contents of their file."""
-    import_numba()
+    """Compile the kernels that a module exports; the contents of their file.
+
+    Raises
+    ------
+    RuntimeError
+        If numba compiles for another processor than the one under whose name the file would be kept.
+    """
+    if not import_numba():
+        raise RuntimeError(
+            "HYBRID_CPU: got "
+            f"{os.environ['HYBRID_CPU']!r}, but numba has compiled functions for this machine's processor in "
+            "this process, and compiles for one processor only. Compile the kernels before, by "
+            "python -m hybrid compile, or without HYBRID_CPU."
+        )
     from hybrid.kernels.types.numba_door.export import exports_of, object_code
 
     with between_passes(), _without_collection():
@@ -140,24 +152,15 @@ def _without_collection() -> Iterator[None]:
 
 
 @cache
-def import_numba() -> None:
-    """Import numba, for the processor that the kernels are compiled for.
+def import_numba() -> bool:
+    """Import numba; whether it compiles for the processor that the kernels are compiled for.
 
-    Raises
-    ------
-    RuntimeError
-        If numba has compiled for another one in this process: its target is made once.
+    It does not if it has compiled for another one in this process: its target is made once.
     """
     from hybrid.kernels.types.numba_door.session import choose_processor, import_array_functions
 
     import_array_functions()
-    if os.environ.get("HYBRID_CPU") and not choose_processor(*cpu()):
-        raise RuntimeError(
-            "HYBRID_CPU: got "
-            f"{os.environ['HYBRID_CPU']!r}, but numba has compiled functions for this machine's processor in "
-            "this process, and compiles for one processor only. Compile the kernels before, by "
-            "python -m hybrid compile, or without HYBRID_CPU."
-        )
+    return not os.environ.get("HYBRID_CPU") or choose_processor(*cpu())
 
 
 def _path(module: str) -> Path:
