@@ -98,7 +98,13 @@ def load_kernels(module: str = DRIVER) -> SimpleNamespace:
 
 
 def loaded(module: str) -> SimpleNamespace:
-    """As ``load_kernels``, for a module that this process has not loaded, or loads anew."""
+    """As ``load_kernels``, for a module that this process has not loaded, or loads anew.
+
+    Raises
+    ------
+    RuntimeError
+        If numba compiles for another processor here than the one under whose name kernels would be kept.
+    """
     content = _on_disk(module)
     if content is None:
         with announced(MESSAGE):
@@ -107,6 +113,12 @@ def loaded(module: str) -> SimpleNamespace:
             elif module in IN_SECOND:
                 second_process.wait_for(lambda: is_kept(module))
                 content = _on_disk(module)
+            if content is None and not import_numba():
+                raise RuntimeError(
+                    f"HYBRID_CPU: got {os.environ['HYBRID_CPU']!r}, but numba has compiled functions for "
+                    "this machine's processor in this process, and compiles for one processor only. Compile the "
+                    "kernels before, by python -m hybrid compile, or without HYBRID_CPU."
+                )
             if content is None:
                 content = compiled(module)
                 keep(_path(module), content)
@@ -114,20 +126,8 @@ def loaded(module: str) -> SimpleNamespace:
 
 
 def compiled(module: str) -> bytes:
-    """Compile the kernels that a module exports; the contents of their file.
-
-    Raises
-    ------
-    RuntimeError
-        If numba compiles for another processor than the one under whose name the file would be kept.
-    """
-    if not import_numba():
-        raise RuntimeError(
-            "HYBRID_CPU: got "
-            f"{os.environ['HYBRID_CPU']!r}, but numba has compiled functions for this machine's processor in "
-            "this process, and compiles for one processor only. Compile the kernels before, by "
-            "python -m hybrid compile, or without HYBRID_CPU."
-        )
+    """Compile the kernels that a module exports; the contents of their file."""
+    import_numba()
     from hybrid.kernels.types.numba_door.export import exports_of, object_code
 
     with between_passes(), _without_collection():
