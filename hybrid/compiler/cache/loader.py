@@ -116,8 +116,8 @@ def loaded(module: str) -> SimpleNamespace:
             if content is None and not import_numba():
                 raise RuntimeError(
                     f"HYBRID_CPU: got {os.environ['HYBRID_CPU']!r}, but numba has compiled functions for "
-                    "this machine's processor in this process, and compiles for one processor only. Compile the "
-                    "kernels before, by python -m hybrid compile, or without HYBRID_CPU."
+                    "this machine's processor in this process, and compiles for one processor only. Compile "
+                    "the kernels before, by python -m hybrid compile, or without HYBRID_CPU."
                 )
             if content is None:
                 content = compiled(module)
