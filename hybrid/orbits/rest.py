@@ -65,6 +65,8 @@ def drift(
     return Drift(chosen, carried[chosen, 0], blur[chosen], slopes[chosen])
 
 
+# Beyond the largest float an integral is infinite or nan: no digit of it is known.
+@np.errstate(over="ignore", invalid="ignore")
 def _integrals(trajectory: Trajectory, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Integrals ``(n, 1 + n)`` of the rates of state and vectors, by Simpson's rule and the trapezoidal one.
 

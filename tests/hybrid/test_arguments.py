@@ -242,7 +242,7 @@ ODDITIES = {
     "large": -1e300,
     "small": 1e-160,
     "smallest": 5e-324,
-    "large pair": (-1e300, 1e300),
+    "large pair": (-1e300, 1e308),
     "half precision": np.float16(0.5),
     "largest unsigned": np.uint64(2**64 - 1),
     "empty points": np.zeros((0, 2)),
