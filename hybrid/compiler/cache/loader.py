@@ -113,16 +113,20 @@ def loaded(module: str) -> SimpleNamespace:
             elif module in IN_SECOND:
                 second_process.wait_for(lambda: is_kept(module))
                 content = _on_disk(module)
-            if content is None and not import_numba():
-                raise RuntimeError(
-                    f"HYBRID_CPU: got {os.environ['HYBRID_CPU']!r}, but numba has compiled functions for "
-                    "this machine's processor in this process, and compiles for one processor only. Compile "
-                    "the kernels before, by python -m hybrid compile, or without HYBRID_CPU."
-                )
             if content is None:
+                _check_processor()
                 content = compiled(module)
                 keep(_path(module), content)
     return SimpleNamespace(**kernels_in(content))
+
+
+def _check_processor() -> None:
+    if not import_numba():
+        raise RuntimeError(
+            f"HYBRID_CPU: got {os.environ['HYBRID_CPU']!r}, but numba has compiled functions for this "
+            "machine's processor in this process, and compiles for one processor only. Compile the kernels "
+            "before, by python -m hybrid compile, or without HYBRID_CPU."
+        )
 
 
 def compiled(module: str) -> bytes:

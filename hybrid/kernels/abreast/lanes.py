@@ -94,7 +94,7 @@ def come_aboard(lane, places, task, room, row):
 def leave(lane, places, task, took, row):
     """Write where a run is at the start of the step from a lane back to the run.
 
-    The state there, with its sizes, is not asked for any more if the run ``took`` the step.
+    The state there is not asked for any more if the run ``took`` the step.
     """
     model, run, method, series = task.model, task.run, task.method, task.work.series
     n, mode, order = model.dimension, run.mode, order_of(model, method, run.mode)

@@ -32,6 +32,13 @@ def state_at(path, n, s, out):
 
 
 @njit(**INLINE)
+def end_of(path, n, out):
+    """Write the state at the end of a path, which stands behind its powers, into ``out (n,)``."""
+    for i in range(n):
+        out[i] = path.powers[path.degree + 1, i]
+
+
+@njit(**INLINE)
 def time_along(path, s):
     """The time since the start at ``s``."""
     return path.pace * s if path.clock < 0 else value_at(path.powers, path.clock, path.degree, s)

@@ -58,10 +58,11 @@ class Sides(NamedTuple):
 
 
 class Before(NamedTuple):
-    """The side of one guard before, and its order."""
+    """The side of one guard before, and its order; it is ``new`` in a mode that another one led to."""
 
     side: Any
     order: Any
+    new: Any
 
 
 @njit(**INLINE)
@@ -118,10 +119,10 @@ def error_of(model, method, run, transition, value, band, work):
 
 
 @njit(**KERNEL)
-def side_of(model, method, run, place, transition, came, before, new, work):
+def side_of(model, method, run, place, transition, came, before, work):
     """Side of a guard, and how it has left zero (``onset``): 0 off the guard. ``work.field`` is current.
 
-    A guard within its rounding is on the side to which the flow takes it; one that is ``new`` here may also
+    A guard within its rounding is on the side to which the flow takes it; one that is new here may also
     have been moved there by the error of the method. If it is at rest there, it has not crossed: it keeps the
     side ``before`` if it was on the guard then, or fires both ways; otherwise it is on the near side. A guard
     without a value keeps its side. A guard that jumps is never at rest: if the flow does not tell its side,
@@ -134,7 +135,7 @@ def side_of(model, method, run, place, transition, came, before, new, work):
     speed = guard_speed(model, transition, t, x, work.field, work.gradient)
     band = rounding_band(model, run, transition, t, x, work)
     sign = 1 if value > 0.0 else -1
-    error = error_of(model, method, run, transition, value, band, work) if new else 1.0
+    error = error_of(model, method, run, transition, value, band, work) if before.new else 1.0
     if abs(value) == math.inf or abs(value) > error * band:
         return sign, 0
     jumps = value != 0.0 and may_jump(model, run, transition, t, x, work)
@@ -222,10 +223,10 @@ def crosses_slowly(model, run, place, transition, work):
 
 
 @njit(**KERNEL)
-def side_here(model, method, run, place, transition, came, before, own, new, work):
+def side_here(model, method, run, place, transition, came, before, own, work):
     """``side_of`` a guard, where one that a coarser rounding let fire early is not taken for crossed."""
     _, t, x = place
-    now, order = side_of(model, method, run, place, transition, came, before, new, work)
+    now, order = side_of(model, method, run, place, transition, came, before, work)
     if not own and order == 0 and before.side == -now:
         speed = guard_speed(model, transition, t, x, work.field, work.gradient)
         if was_left_behind(model, run, transition, t, x, speed, before.side, work):
@@ -265,13 +266,14 @@ def take_side(model, method, run, place, transition, arrival, known_sides, work)
     mode, t, x = place
     came, left, fired = arrival
     direction = model.direction[transition]
-    known, new = came != STARTED, False
-    if came == LANDED and left != mode:
+    known, changed = came != STARTED, came == LANDED and left != mode
+    if changed:
         known = inherit(model, left, fired, transition, known_sides)
-        new = not known
-    before = Before(known_sides.side[transition], known_sides.zero[transition]) if known else Before(0, 0)
+    before = Before(0, 0, changed)
+    if known:
+        before = Before(known_sides.side[transition], known_sides.zero[transition], False)
     own = came == LANDED and left == mode and transition == fired
-    now, order = side_here(model, method, run, place, transition, came, before, own, new, work)
+    now, order = side_here(model, method, run, place, transition, came, before, own, work)
     if own and order == 0 and is_back_soon(model, run, place, transition, now, work):
         # Off the guard, where it has left the state, the reset's own guard has not been reached again.
         now, order = -now, LATER

@@ -28,7 +28,7 @@ from hybrid.kernels.events.guards import (
     size_of_time,
 )
 from hybrid.kernels.events.onset import BY_SPEED, LATER
-from hybrid.kernels.events.path import time_along, time_at
+from hybrid.kernels.events.path import end_of, time_along, time_at
 from hybrid.kernels.events.resolution import (
     UNDERFLOW,
     keep_outcome,
@@ -44,6 +44,7 @@ from hybrid.kernels.types.codes import LEADING, NARROW, NO_TRANSITION
 from hybrid.kernels.types.kinds import INTEGER, REAL
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
+from hybrid.kernels.types.task import task_of
 
 # The signs at the ends of a step must bear so many times its estimated error.
 MARGIN = 100.0
@@ -288,17 +289,16 @@ def is_resolved(model, run, transition, column, path, attempted, on_guard, work)
     It is not asked of a guard that is zero at the start and has stayed so, nor in a series: the derivatives
     tell its side. An ``attempted`` step has its error in ``work.path_error``.
     """
-    if not attempted and (on_guard > 0 or model.degree[run.mode] > 0):
-        return True
-    if not attempted and column != NO_COLUMN:
-        return is_resolved_in_series(model, run, transition, column, path, work)
-    if on_guard > 0:
+    if not attempted:
+        if on_guard > 0 or model.degree[run.mode] > 0:
+            return True
+        if column != NO_COLUMN:
+            return is_resolved_in_series(model, run, transition, column, path, work)
+        keep_error_of_series(model, path, work)
+    elif on_guard > 0:
         asked = on_guard == BY_SPEED and run.since_entry == 0.0
         return not asked or leaves_as_known(model, run, transition, path, work)
-    if not attempted:
-        keep_error_of_series(model, path, work)
-    for i in range(model.dimension):
-        work.trial[i] = path.powers[path.degree + 1, i]
+    end_of(path, model.dimension, work.trial)
     later = time_at(path, path.length)
     return (
         keeps_sign(model, transition, path.start, run.y, work)
@@ -377,11 +377,11 @@ def crossing_by_leading(model, run, guard, path, attempted, work):
 
 
 @njit(**KERNEL)
-def crossing_by_pieces(attempts, model, method, run, transition, column, path, attempted, work):
+def crossing_by_pieces(task, transition, column, path, attempted):
     """Where a guard crosses by its isolation on pieces of the path, as ``crossing_of``."""
+    attempts, model, method, run, _, work = task_of(task)
     on_guard, later, order, end = run.on_guard[transition], time_at(path, path.length), path.degree, 0.0
-    for i in range(model.dimension):
-        work.trial[i] = path.powers[order + 1, i]
+    end_of(path, model.dimension, work.trial)
     if on_guard >= LATER:
         if column == NO_COLUMN:
             end = guard_value(model, transition, later, work.trial, work.scalar)
@@ -391,8 +391,6 @@ def crossing_by_pieces(attempts, model, method, run, transition, column, path, a
     side = run.rehearsal[3, transition]
     run.rehearsal[3, transition] = 0
     if column == NO_COLUMN:
-        for i in range(model.dimension):
-            work.trial[i] = path.powers[order + 1, i]
         small = underflows(model, transition, path.start, run.y, later, work.trial, work.scalar)
     else:
         small = underflows_in_column(path.powers, column, order)
@@ -404,8 +402,9 @@ def crossing_by_pieces(attempts, model, method, run, transition, column, path, a
 
 
 @njit(**KERNEL)
-def crossing_of(attempts, model, method, run, transition, column, path, attempted, work):
+def crossing_of(task, transition, column, path, attempted):
     """Where a guard crosses, the share of the step that is proved, and whether the crossing is resolved."""
+    _, model, method, run, _, work = task_of(task)
     if column != NO_COLUMN:
         guard = guard_at_start(run, transition, column, path)
         leading, rests = leading_of(model, method, run, guard, path, work)
@@ -419,15 +418,14 @@ def crossing_of(attempts, model, method, run, transition, column, path, attempte
                 run.on_guard[transition] = 0
                 return theta, 1.0, resolved
     run.crossings += UNCERTAIN
-    return crossing_by_pieces(attempts, model, method, run, transition, column, path, attempted, work)
+    return crossing_by_pieces(task, transition, column, path, attempted)
 
 
 @njit(**KERNEL)
 def leave_guard(model, run, transition, path, work):
     """Set the side of a guard to its side at the end of the path, if rounding does not hide that."""
     t = time_at(path, path.length)
-    for i in range(model.dimension):
-        work.trial[i] = path.powers[path.degree + 1, i]
+    end_of(path, model.dimension, work.trial)
     value = guard_value(model, transition, t, work.trial, work.scalar)
     model.guard_gradient(transition, t, work.trial, model.parameters, work.gradient)
     if abs(value) > rounding_band(model, run, transition, t, work.trial, work):
@@ -443,7 +441,7 @@ def column_of(model, transition, place, attempted):
 
 
 @njit(**KERNEL)
-def first_event(attempts, model, method, run, path, attempted, ignored, touched, work):
+def first_event(task, path, attempted, ignored, touched):
     """Earliest crossing on a path over the guards of the mode but ``ignored``, and its transition.
 
     The guard of ``ignored`` touches zero at the share ``touched`` of the step. Behind its powers a path has
@@ -457,6 +455,7 @@ def first_event(attempts, model, method, run, path, attempted, ignored, touched,
     no longer held to be zero at its start; ``resolution.restore_sides`` takes that back. For a guard with a
     crossing, ``run.rehearsal[3]`` holds its side before that.
     """
+    _, model, _, run, _, work = task_of(task)
     mode, powers, order = run.mode, path.powers, path.degree
     earliest, fired, proved, blurred = NO_ROOT, NO_TRANSITION, 1.0, NO_TRANSITION
     forget_touches(run)
@@ -476,9 +475,7 @@ def first_event(attempts, model, method, run, path, attempted, ignored, touched,
             value, size = powers[order + 1, column] * side, powers[order + 2, column]
             if keeps_half(powers[0, column] * side, value, size):
                 continue
-        theta, share, resolved = crossing_of(
-            attempts, model, method, run, transition, column, path, attempted, work
-        )
+        theta, share, resolved = crossing_of(task, transition, column, path, attempted)
         proved = min(proved, share)
         if not resolved:
             blurred = transition

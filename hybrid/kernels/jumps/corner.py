@@ -104,7 +104,7 @@ def arrived(task):
             continue
         place = Place(mode, t, run.y)
         now, _ = side_here(
-            model, method, run, place, transition, STARTED, Before(before, 0), False, False, work
+            model, method, run, place, transition, STARTED, Before(before, 0, False), False, work
         )
         crossed = now == -before and crosses_towards(model.direction[transition], now)
         if crossed and allowed(model, transition, t, run.y, work.scalar):

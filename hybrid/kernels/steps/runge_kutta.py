@@ -147,15 +147,16 @@ def affine_column(model, method, run, transition, column, h, path, work):
 def path_of_attempt(model, method, run, h, work):
     """The path of an attempted step: its interpolant, with affine guards behind the state, and its error."""
     n, mode, t, path = model.dimension, run.mode, run.phase, path_of_step(method, run.phase, h, work)
-    rows, first = path.powers, model.first_outgoing[mode]
-    if not all_affine(model, mode):
+    rows, first, alone = path.powers, model.first_outgoing[mode], all_affine(model, mode)
+    if not alone:
         interpolant_path(method, h, run.y, n, work)
     for i in range(n):
         # Where a step is too long, either estimate may be close to zero.
         error = h * (abs(work.error[i]) + abs(work.second_error[i]))
         keep_error(i, error, max(abs(run.y[i]), abs(work.new[i]), abs(h * work.stages[0, i])), work)
         rows[path.degree + 1, i] = work.new[i]
-        if all_affine(model, mode):
+        if alone:
+            # The powers of the state are not asked for, but for the first two.
             rows[0, i], rows[1, i] = run.y[i], h * work.stages[0, i]
     for slot in range(first, model.first_outgoing[mode + 1]):
         transition, column = model.outgoing[slot], n + slot - first
@@ -176,15 +177,13 @@ def find_event(task, h, interpolated):
     a grazing; the step is then searched again without that guard. A step whose error may have made the
     crossing has the length zero and no transition, unless rounding of time allows none that is shorter.
     """
-    attempts, model, method, run, _, work = task_of(task)
+    _, model, method, run, _, work = task_of(task)
     mode, t, ignored, touched = run.mode, run.phase, NO_TRANSITION, 0.0
     for trial in range(2):
         if not (interpolated and trial == 0):
             interpolation_stages(model, method, mode, t, h, run.y, work)
         path = path_of_attempt(model, method, run, h, work)
-        theta, fired, proved, blurred = first_event(
-            attempts, model, method, run, path, True, ignored, touched, work
-        )
+        theta, fired, proved, blurred = first_event(task, path, True, ignored, touched)
         if blurred != NO_TRANSITION:
             restore_sides(model, run)
             if SHORTER * h > FINEST * measured_time(model, run, mode):
@@ -196,9 +195,7 @@ def find_event(task, h, interpolated):
             attempt_again(task, h)
             interpolation_stages(model, method, mode, t, h, run.y, work)
             path = path_of_attempt(model, method, run, h, work)
-            theta, fired, proved, _ = first_event(
-                attempts, model, method, run, path, True, ignored, touched, work
-            )
+            theta, fired, proved, _ = first_event(task, path, True, ignored, touched)
         if proved < min(theta, 1.0):
             attempt_again(task, proved * h)
             return proved * h, 0.0, NO_TRANSITION

@@ -286,20 +286,16 @@ def is_finite(path, n):
 @njit(**INLINE)
 def up_to_event(task, path):
     """The path up to its first event, the transition, and whether it is cut before, where it is proved."""
-    attempts, model, method, run, record, work = task_of(task)
+    _, model, _, run, record, work = task_of(task)
     mode, finest = run.mode, FINEST * measured_time(model, run, run.mode)
-    theta, fired, proved, blurred = first_event(
-        attempts, model, method, run, path, False, NO_TRANSITION, 0.0, work
-    )
+    theta, fired, proved, blurred = first_event(task, path, False, NO_TRANSITION, 0.0)
     for _ in range(MOST_SHORTER):
         if blurred == NO_TRANSITION or SHORTER * path.length <= finest:
             break
         path = up_to(path, SHORTER * path.length)
         evaluate_end(model, mode, path)
         restore_sides(model, run)
-        theta, fired, proved, blurred = first_event(
-            attempts, model, method, run, path, False, NO_TRANSITION, 0.0, work
-        )
+        theta, fired, proved, blurred = first_event(task, path, False, NO_TRANSITION, 0.0)
     end = min(theta, proved, 1.0)
     if run.grazing_place <= end:
         s = run.grazing_place * path.length

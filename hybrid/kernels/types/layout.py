@@ -293,10 +293,10 @@ class Work(Structure):
     (n,)``; ``departure (n,)``, the state before the step; ``path_error (n,)``, how far a step may be off at
     its end; ``scale_before (n,)``, sizes of the state that the run goes back to; ``saltation, sizes (n, n)``;
     ``rounding (4, n)``, how far the rates move, and the place where a guard's derivatives are asked for;
-    ``path (d + 3, n + guards)``, the powers of the step's
-    interpolant and of guards on it, their values at its end and what these are sums of;
-    ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for its isolation; ``registers (r, 6)``,
-    what is known of each row of a program, and ``samples (nodes + 1, 2 r)`` the ranges of these rows at the
+    ``path (d + 3, n + guards)``, the powers of the step's interpolant and of guards on it, their values at
+    its end and what these are sums of; ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for
+    its isolation; ``registers (r, 6)``, what is known of each row of a program, and ``samples (nodes + 1,
+    2 r)`` the ranges of these rows at the
     nodes of a step and what they have in common; ``rates (2, N)``, the field along a step.
 
     For implicit methods, else empty: ``systems ((s + 1) n + s + 4, s n)``, ``pivots ((s + 1) n,)``. The rows
