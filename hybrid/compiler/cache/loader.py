@@ -98,13 +98,7 @@ def load_kernels(module: str = DRIVER) -> SimpleNamespace:
 
 
 def loaded(module: str) -> SimpleNamespace:
-    """As ``load_kernels``, for a module that this process has not loaded, or loads anew.
-
-    Raises
-    ------
-    RuntimeError
-        If numba compiles for another processor here than the one under whose name kernels would be kept.
-    """
+    """As ``load_kernels``, for a module that this process has not loaded, or loads anew."""
     content = _on_disk(module)
     if content is None:
         with announced(MESSAGE):
@@ -114,24 +108,25 @@ def loaded(module: str) -> SimpleNamespace:
                 second_process.wait_for(lambda: is_kept(module))
                 content = _on_disk(module)
             if content is None:
-                _check_processor()
                 content = compiled(module)
                 keep(_path(module), content)
     return SimpleNamespace(**kernels_in(content))
 
 
-def _check_processor() -> None:
+def compiled(module: str) -> bytes:
+    """Compile the kernels that a module exports; the contents of their file.
+
+    Raises
+    ------
+    RuntimeError
+        If numba compiles for another processor here than the one under whose name they would be kept.
+    """
     if not import_numba():
         raise RuntimeError(
-            f"HYBRID_CPU: got {os.environ['HYBRID_CPU']!r}, but numba has compiled functions for this "
-            "machine's processor in this process, and compiles for one processor only. Compile the kernels "
-            "before, by python -m hybrid compile, or without HYBRID_CPU."
+            f"HYBRID_CPU: got {cpu()[0]!r}, but numba has compiled functions for another processor in this "
+            "process, and compiles for one processor only. Compile the kernels before, by "
+            "python -m hybrid compile, or without HYBRID_CPU."
         )
-
-
-def compiled(module: str) -> bytes:
-    """Compile the kernels that a module exports; the contents of their file."""
-    import_numba()
     from hybrid.kernels.types.numba_door.export import exports_of, object_code
 
     with between_passes(), _without_collection():
@@ -155,7 +150,6 @@ def _without_collection() -> Iterator[None]:
             gc.enable()
 
 
-@cache
 def import_numba() -> bool:
     """Import numba; whether it compiles for the processor that the kernels are compiled for.
 
