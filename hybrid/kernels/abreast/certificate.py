@@ -12,11 +12,16 @@ operations.
 """
 
 import math
+from functools import reduce
 
 import numpy as np
-from numba import njit
+from llvmlite import ir
+from numba import njit, types
 
 from hybrid.kernels.abreast.rows import (
+    MASK,
+    ROWS,
+    address_in,
     bits_of,
     both,
     either,
@@ -27,7 +32,10 @@ from hybrid.kernels.abreast.rows import (
     without,
 )
 from hybrid.kernels.arithmetic.wide import fused, smaller
+from hybrid.kernels.instructions.registers import NUMBER, everywhere, multiply_add, read
 from hybrid.kernels.types.abreast import DEGREE
+from hybrid.kernels.types.codes import ABREAST
+from hybrid.kernels.types.numba_door.building import intrinsic
 from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Pieces that are looked at, and the shortest one, as a share of the step.
@@ -55,27 +63,37 @@ def put_on_piece(powers, begin, length, moved):
         power = power * length
 
 
-@njit(**INLINE)
-def signs(powers, side, band, open_):
-    """The runs whose Bernstein coefficients all lie beyond a band, and those where they change sign once."""
-    nobody = without(open_, open_)
-    clear, changes, wrong, unclear, beyond = open_, open_, nobody, nobody, nobody
-    for i in range(DEGREE + 1):
-        total = rows_at(powers, 0)
-        for k in range(1, i + 1):
-            total = fused(rows_at(powers, k), WEIGHTS[i, k], total)
-        value = total * side
-        is_clear, is_beyond = value > band, value < -band
-        between = without(without(open_, is_clear), is_beyond)
-        # After the first that is not clear, all others are beyond; one alone may be in between.
-        left = either(unclear, beyond)
-        wrong = either(wrong, both(left, without(open_, is_beyond)))
-        unclear = either(unclear, between)
-        beyond = either(beyond, is_beyond)
-        clear = both(clear, is_clear)
-        if i == 0:
-            changes = is_clear
-    return clear, without(both(changes, beyond), wrong)
+@intrinsic
+def signs(typing_context, powers, side, band):
+    """The runs whose Bernstein coefficients all lie beyond a band, and those where they change sign once.
+
+    They do if the first is beyond the band on the ``side``, the last on the other, and each of them on the
+    other side, or behind one that is still on the first.
+    """
+
+    def generate(context, builder, signature, arguments):
+        array, side, band = arguments
+        # All coefficients grow at the same time: a sum alone would wait for itself.
+        totals = [_power(context, builder, signature.args[0], array, 0)] * (DEGREE + 1)
+        for k in range(1, DEGREE + 1):
+            power = _power(context, builder, signature.args[0], array, k)
+            for i in range(k, DEGREE + 1):
+                weight = everywhere(builder, NUMBER(WEIGHTS[i, k]), ABREAST)
+                totals[i] = multiply_add(builder, power, weight, totals[i])
+        values = [builder.fmul(total, side) for total in totals]
+        before = [builder.fcmp_ordered(">", value, band) for value in values]
+        behind = [builder.fcmp_ordered("<", value, builder.fneg(band)) for value in values]
+        changes = builder.and_(before[0], behind[-1])
+        for i in range(1, DEGREE + 1):
+            changes = builder.and_(changes, builder.or_(behind[i], before[i - 1]))
+        return context.make_tuple(builder, signature.return_type, [reduce(builder.and_, before), changes])
+
+    return types.UniTuple(MASK, 2)(powers, ROWS, ROWS), generate
+
+
+def _power(context, builder, kind, array, k):
+    place = address_in(context, builder, kind, array, [ir.IntType(64)(k)])
+    return read(builder, place, ABREAST)
 
 
 @njit(**KERNEL)
@@ -90,10 +108,10 @@ def certify(powers, side, band, asked, moved):
     none, one = nobody, nobody
     for piece in range(MOST_PIECES):
         if piece == 0:
-            clear, changes = signs(powers, side, band, asked)
+            clear, changes = signs(powers, side, band)
         else:
             put_on_piece(powers, begin, length, moved)
-            clear, changes = signs(moved, side, band, asked)
+            clear, changes = signs(moved, side, band)
         clear, changes = both(clear, asked), both(changes, asked)
         end = begin + length
         through = both(clear, end >= 1.0)

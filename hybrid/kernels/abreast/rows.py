@@ -42,7 +42,7 @@ class _Mask(models.PrimitiveModel):
         super().__init__(manager, kind, MASK_KIND)
 
 
-def _address(context, builder, kind, array, indices):
+def address_in(context, builder, kind, array, indices):
     """Where the numbers of an entry of an array begin: each entry has one number of each run."""
     made = context.make_array(kind)(context, builder, array)
     *rows, last = indices
@@ -57,7 +57,7 @@ def rows_at(typing_context, array, place):
     """Entry ``place`` of a vector, which has one number of each run."""
 
     def generate(context, builder, signature, arguments):
-        address = _address(context, builder, array, arguments[0], arguments[1:])
+        address = address_in(context, builder, array, arguments[0], arguments[1:])
         return read(builder, address, ABREAST)
 
     return ROWS(array, types.intp), generate
@@ -68,7 +68,7 @@ def entry_at(typing_context, array, row, column):
     """An entry of a matrix, which has one number of each run."""
 
     def generate(context, builder, signature, arguments):
-        address = _address(context, builder, array, arguments[0], arguments[1:])
+        address = address_in(context, builder, array, arguments[0], arguments[1:])
         return read(builder, address, ABREAST)
 
     return ROWS(array, types.intp, types.intp), generate
@@ -79,7 +79,7 @@ def put_rows(typing_context, array, place, rows):
     """Write entry ``place`` of a vector."""
 
     def generate(context, builder, signature, arguments):
-        address = _address(context, builder, array, arguments[0], arguments[1:2])
+        address = address_in(context, builder, array, arguments[0], arguments[1:2])
         write(builder, in_registers(builder, ABREAST, [rows], arguments[2:])[0], address)
         return context.get_dummy_value()
 
@@ -91,7 +91,7 @@ def put_entry(typing_context, array, row, column, rows):
     """Write an entry of a matrix."""
 
     def generate(context, builder, signature, arguments):
-        address = _address(context, builder, array, arguments[0], arguments[1:3])
+        address = address_in(context, builder, array, arguments[0], arguments[1:3])
         write(builder, in_registers(builder, ABREAST, [rows], arguments[3:])[0], address)
         return context.get_dummy_value()
 
