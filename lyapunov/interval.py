@@ -35,7 +35,8 @@ class Growths(Structure, counters=("count",)):
     ``batch_states (R, 3)`` are those of ``lyapunov.batches``, over all intervals so far.
 
     The jumps of each transition are counted for a run alone: so far they are ``hits (T,)`` in the interval
-    that is under way, and the last columns are their numbers per unit time. For runs together ``T`` is zero.
+    that is under way, and the last columns are their numbers per unit time. For runs together ``T`` is zero;
+    ``plain (R,)`` is 1 for those that have reached their end with nothing to tell.
     """
 
     counters: INDICES
@@ -47,6 +48,7 @@ class Growths(Structure, counters=("count",)):
     rates: CUBE
     batches: CUBE
     batch_states: INDEX_MATRIX
+    plain: INDICES
 
 
 class Maps(Structure, counters=("done", "count")):
@@ -84,7 +86,7 @@ def growths_layout(runs: int, tangents: int, counted: int) -> Layout:
     columns = tangents + 1 + counted
     shapes = {
         "counters": (1,),
-        **dict.fromkeys(("done", "cycles", "phases", "lengths"), (runs,)),
+        **dict.fromkeys(("done", "cycles", "phases", "lengths", "plain"), (runs,)),
         "hits": (counted,),
         "rates": (runs, INTERVALS_AT_ONCE, columns),
         "batches": (runs, MAX_BATCHES, columns),

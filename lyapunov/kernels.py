@@ -5,6 +5,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.tangent import orthonormalise
+from hybrid.kernels.types import notes
 from hybrid.kernels.types.abreast import Crew
 from hybrid.kernels.types.codes import (
     DONE,
@@ -25,6 +26,7 @@ from lyapunov.interval import End, Growths, Maps
 UNLIMITED = 9223372036854775807
 
 push = njit(**KERNEL)(batches.push)
+is_plain, carries_plainly = njit(**KERNEL)(notes.is_plain), njit(**KERNEL)(notes.carries_plainly)
 growths_at, maps_at = structure_at(Growths), structure_at(Maps)
 
 
@@ -108,6 +110,8 @@ def growth_of_run(parts, task, crew, r, code):
     if code == DONE:
         end_interval(task, growths, r)
         if growths.done[r] == growths.count:
+            plain = carries_plainly(task.run) and is_plain(task.model, task.run, 0)
+            growths.plain[r] = 1 if plain else 0
             return DONE
     elif code != GO_ON:
         return code

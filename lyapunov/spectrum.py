@@ -24,13 +24,14 @@ from hybrid.display.progress import Progress, progress_bar
 from hybrid.display.tables import counted, html_table
 from hybrid.kernels.types import codes
 from hybrid.kernels.types.entries import COUNTERS
-from hybrid.simulation.ending import status_of
+from hybrid.simulation.ending import has_tangents, status_of
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.pace import time_scale
 from hybrid.simulation.periods import check_time
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
+from hybrid.status import SUCCESS
 from hybrid.system.growth import growing
 from hybrid.transform.aged import least_dimension, original_of, without_age
 from lyapunov.batches import EMPTY, closed_batch_means
@@ -349,6 +350,7 @@ class Estimates:
         growths.phases[:] = [each.run.phase for each in self.trajectories]
         growths.lengths[:] = lengths
         growths.batch_states[:] = EMPTY
+        growths.plain[:] = 0
         self.codes = np.full(len(flights), codes.DONE)
         self.counts = np.zeros(len(flights), dtype=np.int64)
 
@@ -462,6 +464,9 @@ class Estimates:
     def status(self, i: int) -> Status:
         """How run ``i`` has ended."""
         trajectory = self.trajectories[i]
+        plain = self.codes[i] == codes.DONE and self.growths.plain[i] == 1
+        if plain and not trajectory.beyond and has_tangents(trajectory):
+            return SUCCESS
         status = status_of(trajectory, int(self.codes[i]))
         run = trajectory.run
         if not status.ok or not run.ill_conditioned:

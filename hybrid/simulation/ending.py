@@ -9,7 +9,7 @@ import numpy as np
 
 from hybrid.display.tables import counted
 from hybrid.kernels.types import codes
-from hybrid.kernels.types.notes import MOST_LATENESS, is_plain
+from hybrid.kernels.types.notes import MOST_LATENESS, carries_plainly, is_plain
 from hybrid.simulation.trajectory import Trajectory
 from hybrid.status import (
     SUCCESS,
@@ -41,7 +41,9 @@ SOON = 1e-6
 def status_of(trajectory: Trajectory, code: int) -> Status:
     """Status of a run after its ``advance`` returned ``code``."""
     _grow(trajectory, code)
-    complete = code == codes.DONE and (not trajectory.tangents or _carries_plainly(trajectory))
+    complete = code == codes.DONE
+    if trajectory.tangents:
+        complete = complete and has_tangents(trajectory) and carries_plainly(trajectory.run)
     if complete and is_plain(trajectory.model, trajectory.run, len(trajectory.beyond)):
         return SUCCESS
     status = _status(trajectory, code)
@@ -83,11 +85,9 @@ class Ending:
         return self._status
 
 
-def _carries_plainly(trajectory: Trajectory) -> bool:
-    """Whether there is nothing to tell of the tangent vectors of a run that has reached its end."""
-    run = trajectory.run
-    met = run.singular_jumps + run.ill_conditioned + run.steep_jumps + run.field_jumps + run.indistinct
-    return met == 0 and trajectory.compiled.is_smooth and not trajectory.system.switching
+def has_tangents(trajectory: Trajectory) -> bool:
+    """Whether the model of a run has tangent vectors everywhere."""
+    return trajectory.compiled.is_smooth and not trajectory.system.switching
 
 
 def _notes(trajectory: Trajectory, code: int) -> list[str]:

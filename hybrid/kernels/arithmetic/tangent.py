@@ -32,6 +32,8 @@ CLOSE_IN_EXACT, CLOSE_IN_TAYLOR, CLOSE_IN_RUNGE_KUTTA = 1e-3**2, 1e-1**2, 1e-2**
 # stiff contact stretches all vectors along the speed and shrinks them again before it ends: such stretching
 # is no sign of exponents that are far apart.
 STEPS_IN_EXACT, STEPS_IN_CONTACT = 2, 16
+# One vector has no other that it could come close to: it is only kept from growing without bound.
+STEPS_ALONE = 32
 # Tangent vectors are also orthonormalised when the square of a length leaves this range.
 SHORTEST_SQUARE, LONGEST_SQUARE = 1e-200, 1e200
 
@@ -137,6 +139,8 @@ def keep_apart(model, run, mode, tangents, gram):
         closest = CLOSE_IN_RUNGE_KUTTA
     elif kind == DESINGULARISED:
         steps = STEPS_IN_CONTACT
+    if tangents == 1:
+        steps = STEPS_ALONE
     run.unchecked += 1
     if run.unchecked < steps:
         return

@@ -34,3 +34,12 @@ def is_plain(model, run, beyond):
     may_run_dry = model.steep[run.mode] == 1 and model.propagator[run.mode] == RUNGE_KUTTA
     uncertain = run.unknown_time != 0.0 or run.lateness > MOST_LATENESS or may_run_dry
     return steps + run.order_mattered + run.turned + held + beyond == 0 and not uncertain
+
+
+def carries_plainly(run):
+    """Whether there is nothing to tell of the tangent vectors of a run that has reached its end.
+
+    It may be that they have no meaning in the model.
+    """
+    met = run.singular_jumps + run.ill_conditioned + run.steep_jumps + run.field_jumps + run.indistinct
+    return met == 0
