@@ -438,13 +438,19 @@ def complete(parts, task, room, span, stop_cycle, stop_phase, alone):
 
     An event may be known to be ``alone``: then it is the one that fires.
     """
+    go_forward(task.model, task.run, span)
+    return conclude(parts, task, room, span, span, stop_cycle, stop_phase, alone)
+
+
+@njit(**KERNEL)
+def conclude(parts, task, room, span, length, stop_cycle, stop_phase, alone):
+    """``complete`` for a step of this ``length`` whose time is counted; its ``room`` is ``span`` before."""
     model, run = task.model, task.run
     if not gets_on(model, task.method, run, room.remains):
         return STEP_TOO_SMALL
-    go_forward(model, run, span)
     if model.timed[run.mode] == 1 and is_late(task.method, run):
-        parts.late_step(model, task.method, run, span, task.work)
-    if task.tangents > 0 and task.orthonormal != 0 and 0.0 < span < room.remains:
+        parts.late_step(model, task.method, run, length, task.work)
+    if task.tangents > 0 and task.orthonormal != 0 and length > 0.0 and span < room.remains:
         parts.keep_apart(model, run, run.mode, task.tangents, task.work.jacobian)
     fired = run.pending
     if span > room.remains or (span >= room.remains and fired == NO_TRANSITION):

@@ -24,7 +24,7 @@ from hybrid.kernels.types.structure import Layout
 from hybrid.simulation.memory import MOST_LAYOUTS
 
 # Rows of the series behind the last order; columns are read four at a time.
-ROWS_OF_END, SPARE_COLUMNS = 3, 3
+ROWS_OF_END, SPARE_COLUMNS = 5, 3
 # A guard that is zero at the start is divided by its variable: it has a power more.
 POWERS = DEGREE + 2
 # Steps after which a run leaves its lane, so that Python hears of it; and in which tangent vectors that are
@@ -96,13 +96,14 @@ def _together(compiled: CompiledSystem, plan: Any, tangents: int) -> Together:
     width, length = codes.ABREAST, n * (1 + tangents)
     entries = length + len(system.parameters) + NUMBERS + n + PER_GUARD * guards
     shapes = {
-        "counters": (1,),
+        "counters": (3,),
         "powers": (codes.HIGHEST_ORDER + ROWS_OF_END + guards, max(columns, n + 2) * width),
         "lanes": (len(system.modes), entries * width),
         "weights": (length * width,),
         "polynomial": (POWERS * width,),
         "moved": (POWERS * width,),
         "ends": (2 * width,),
+        "stops": (2 * width,),
         "fired": (width,),
     }
     able_of = np.array(able, dtype=np.int64)

@@ -58,7 +58,7 @@ def simulate_many(
     """Run a system from many starts: where each run ends, and its state at the samples.
 
     The ends are those of :func:`hybrid.simulate`, up to rounding: runs take their steps together, but what
-    one finds depends on no other. With ``samples``, steps end at the samples. A run that fails does so alone.
+    one finds depends on no other. A run that fails does so alone.
     Ctrl-C ends the call, not the program: runs that are not complete have the status ``NOT_RUN``.
 
     Parameters

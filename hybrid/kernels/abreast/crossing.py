@@ -134,23 +134,25 @@ def root_in(sea, column, order, known, side, begin, length, h, found):
             value = fused(value, x, rows_at(sea.polynomial, i))
         x, _, low, high = corrected(value, rate, side, x, low, high)
     low, high = begin, begin + length
-    settled, slope, last = without(found, found), in_every_run(1.0), in_every_run(0.0)
+    settled, slope = without(found, found), in_every_run(1.0)
     for _ in range(MOST_CORRECTIONS):
         place = x * h
-        value, rate = entry_at(powers, order, column), in_every_run(0.0)
+        value, rate, bend = entry_at(powers, order, column), in_every_run(0.0), in_every_run(0.0)
         for o in range(order - 1, -1, -1):
+            bend = fused(bend, place, rate)
             rate = fused(rate, place, value)
             value = fused(value, place, entry_at(powers, o, column))
-        value, rate = value - start, rate * h
+        value, rate, bend = value - start, rate * h, bend * h * h
         # A guard that is zero at the start is divided by its variable.
         over, under = where(known, value * x, value), where(known, fused(rate, x, -value), rate)
+        bent = where(known, bend * x / under - 1.0 / x, bend / under)
         slope = where(settled, slope, under)
         nearer, inside, low, high = corrected(over, under, side, x, low, high)
-        shift = magnitude(nearer - x)
+        shift = nearer - x
         x = where(settled, x, nearer)
-        # Newton's corrections go with the square of the one before: so much the next one would be.
-        close = shift * shift * shift <= AT_ROOT * x * last * last
-        settled, last = either(settled, both(inside, close)), shift
+        # So much the next correction would be.
+        close = magnitude(bent) * shift * shift <= AT_ROOT * x
+        settled = either(settled, both(inside, close))
         if bits_of(without(found, settled)) == 0:
             break
     # What has been left of a guard that counts as zero is made up for.
@@ -204,6 +206,7 @@ def first_crossing(model, method, sea, lane, places, mode, order, h, exact, able
         start, side = entry_at(powers, 0, column), rows_at(lane, places.guards + PER_GUARD * (slot - first))
         known = rows_at(lane, places.guards + PER_GUARD * (slot - first) + 1) > 0.5
         band = band_of(model, method, sea, clock, mode, slot - first, order, size, h, exact)
+        put_rows(lane, places.guards + PER_GUARD * (slot - first) + 3, band)
         distant = both(distant, value * side > DISTANT * band)
         keeps = without(start * side > size - value * side + 2.0 * band, known)
         asked = without(able, keeps)

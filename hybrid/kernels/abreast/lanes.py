@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 from numba import njit
 
+from hybrid.kernels.arithmetic.bernstein import NO_ROOT
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.events.onset import BY_SPEED
+from hybrid.kernels.guards.touch import forget_touches
 from hybrid.kernels.steps.series import (
     AHEAD,
     NEXT_TO_NOTHING,
@@ -22,6 +24,7 @@ from hybrid.kernels.types.abreast import (
     CYCLE,
     DIVERGENCE,
     FOLLOWS,
+    LEADS_ON,
     LONGEST_STEP,
     LOW,
     NUMBERS,
@@ -33,7 +36,7 @@ from hybrid.kernels.types.abreast import (
     STEPS,
     T,
 )
-from hybrid.kernels.types.codes import ABREAST, READY
+from hybrid.kernels.types.codes import ABREAST, DESINGULARISED, READY
 from hybrid.kernels.types.kinds import INTEGER
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -58,6 +61,16 @@ def places_in(model, tangents, parameters, mode):
     return Places(first, numbers, sizes, sizes + n, number_of_guards(model, mode))
 
 
+@njit(**INLINE)
+def leads_on(model, mode, tangents):
+    """Whether a step may lead beyond the time at which a run is asked for: nothing else ends its room.
+
+    Tangent vectors may be exchanged there for others; one is at most scaled.
+    """
+    timeless = model.clocks.shape[0] == 0 and model.knots.shape[0] == 0
+    return timeless and tangents <= 1 and model.degree[mode] == 0 and model.propagator[mode] != DESINGULARISED
+
+
 @njit(**KERNEL)
 def come_aboard(lane, places, task, room, row):
     """Write where a run is, at the start of a step, into its place in a lane."""
@@ -78,6 +91,7 @@ def come_aboard(lane, places, task, room, row):
     lane[first + STEPS * ABREAST], lane[first + DIVERGENCE * ABREAST] = 0.0, 0.0
     lane[first + FOLLOWS * ABREAST] = 1.0 if run.stage == READY else 0.0
     lane[first + PERIOD * ABREAST] = model.period
+    lane[first + LEADS_ON * ABREAST] = 1.0 if leads_on(model, mode, task.tangents) else 0.0
     for i in range(n):
         lane[(places.sizes + i) * ABREAST + row] = run.scale[i]
     slot, place = model.first_outgoing[mode], places.guards * ABREAST + row
@@ -91,18 +105,15 @@ def come_aboard(lane, places, task, room, row):
 
 
 @njit(**KERNEL)
-def leave(lane, places, task, took, row):
-    """Write where a run is at the start of the step from a lane back to the run.
-
-    The state there is not asked for any more if the run ``took`` the step.
-    """
+def leave(lane, places, task, row):
+    """Write where a run is at the end of its last step from a lane back to the run, clear of all guards."""
     model, run, method, series = task.model, task.run, task.method, task.work.series
     n, mode, order = model.dimension, run.mode, order_of(model, method, run.mode)
     first = places.numbers * ABREAST + row
     steps = int(lane[first + STEPS * ABREAST])
     if steps == 0:
         return
-    for i in range(0 if took else places.parameters):
+    for i in range(places.parameters):
         run.y[i] = lane[i * ABREAST + row]
     run.phase, run.phase_low = lane[first + T * ABREAST], lane[first + LOW * ABREAST]
     run.cycle += int(lane[first + CYCLE * ABREAST])
@@ -112,11 +123,18 @@ def leave(lane, places, task, took, row):
     run.unchecked += steps
     for i in range(n):
         run.scale[i] = lane[(places.sizes + i) * ABREAST + row]
-    slot, place = model.first_outgoing[mode], places.guards * ABREAST + row
-    rooted = holds_roots(model, mode)
-    for g in range(places.count):
-        run.on_guard[model.outgoing[slot + g]] = 0
-        if rooted:
-            series[order + 1, n + g] = lane[place + 2 * ABREAST]
-        place += PER_GUARD * ABREAST
+    for g in range(places.count if holds_roots(model, mode) else 0):
+        series[order + 1, n + g] = lane[(places.guards + PER_GUARD * g + 2) * ABREAST + row]
+    clear_guards(model, run, steps)
+
+
+@njit(**INLINE)
+def clear_guards(model, run, steps):
+    """Let a run be at the end of a step, clear of all guards, after so many steps in its lane."""
     run.stage = READY
+    forget_touches(run)
+    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
+        transition = model.outgoing[slot]
+        # Only the first step may have begun on a guard.
+        run.rehearsal[1, transition] = run.on_guard[transition] if steps == 1 else 0
+        run.on_guard[transition], run.rehearsal[3, transition], run.passed[transition] = 0, 0, NO_ROOT

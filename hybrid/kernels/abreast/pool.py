@@ -2,35 +2,41 @@
 
 from numba import njit
 
+from hybrid.kernels.abreast.ashore import evaluate_stops, largest_of_tangent, look_ahead, look_out, reach
 from hybrid.kernels.abreast.lanes import come_aboard, leave, places_in
 from hybrid.kernels.abreast.rows import bits_of, mask_of
 from hybrid.kernels.abreast.step import step_abreast
-from hybrid.kernels.arithmetic.bernstein import NO_ROOT
-from hybrid.kernels.drive import Room, complete, keep_scale, prepare, reaches_one_guard, remember_scale
+from hybrid.kernels.arithmetic.clock import set_clock
+from hybrid.kernels.drive import (
+    NO_ROOM,
+    Room,
+    conclude,
+    go_forward,
+    prepare,
+    reaches_one_guard,
+    remember_scale,
+)
 from hybrid.kernels.events.onset import BY_SPEED
-from hybrid.kernels.guards.touch import forget_touches
 from hybrid.kernels.steps.field.late import is_late
-from hybrid.kernels.steps.series import holds_roots, land, order_of
 from hybrid.kernels.types.abreast import ONWARD, ROOM, STEPS, Abreast, Crew
 from hybrid.kernels.types.codes import (
     ABREAST,
-    DESINGULARISED,
     DONE,
     GO_ON,
     MAX_STEPS,
     NO_MODE,
     NO_TRANSITION,
-    READY,
     RUNGE_KUTTA,
 )
 from hybrid.kernels.types.kinds import INTEGER
-from hybrid.kernels.types.layout import ADVANCE, Parts, Path, Task
+from hybrid.kernels.types.layout import ADVANCE, Parts, Task
 from hybrid.kernels.types.numba_door.addressed import structure_at
 from hybrid.kernels.types.options import INLINE, KERNEL, exported
 
 task_at = structure_at(Task)
 # Steps that a run takes at once in a mode in which none are taken abreast.
 ALONE = 16
+NOBODY = -1
 
 
 @njit(**KERNEL)
@@ -46,44 +52,6 @@ def is_plain(model, method, run, sea):
         if run.side[transition] == 0 or run.on_guard[transition] > BY_SPEED:
             return False
     return True
-
-
-@njit(**KERNEL)
-def take_ashore(sea, task, row):
-    """Move a run to the end of its step; returns the time that it took. An event is left pending."""
-    model, run, work, method = task.model, task.run, task.work, task.method
-    n, mode, tangents = model.dimension, run.mode, task.tangents
-    order, powers, fired = order_of(model, method, mode), sea.powers, sea.fired[row]
-    first, last = model.first_outgoing[mode], model.first_outgoing[mode + 1]
-    on_guard = remember_scale(model, run, work)
-    span, t = sea.ends[row], run.phase
-    run.steps += 1
-    for i in range(n):
-        run.scale[i] = powers[order + 2, i * ABREAST + row]
-        run.y[i] = powers[order + 1, i * ABREAST + row]
-    if tangents > 0:
-        run.divergence += powers[order + 1, (n + last - first + 1) * ABREAST + row]
-        for k in range(tangents):
-            begin = sea.tangent_start + k * sea.tangent_columns[mode]
-            for i in range(n):
-                run.y[n * (1 + k) + i] = powers[order + 1, (begin + i) * ABREAST + row]
-    forget_touches(run)
-    for slot in range(first, last):
-        transition, column = model.outgoing[slot], n + slot - first
-        run.rehearsal[1, transition], run.on_guard[transition] = run.on_guard[transition], 0
-        run.rehearsal[3, transition] = run.side[transition] if transition == fired else 0
-        run.passed[transition] = NO_ROOT
-        if holds_roots(model, mode):
-            work.series[order + 1, column] = powers[order + 1, column * ABREAST + row]
-    run.stage = READY
-    run.distant = 1 if fired == NO_TRANSITION and (sea.distant >> row) & 1 else 0
-    if fired != NO_TRANSITION:
-        clock = 0 if model.propagator[mode] == DESINGULARISED else -1
-        path = Path(work.series, order, clock, t, 1.0, sea.ends[ABREAST + row], False, 1)
-        span += land(model, run, tangents, fired, path, span, work)
-        run.pending = fired
-        keep_scale(model, run, on_guard, t + span, work)
-    return span
 
 
 @njit(**INLINE)
@@ -105,22 +73,35 @@ def board(sea, crew, mode, row, r):
 
 
 @njit(**KERNEL)
+def go_to_next_step(parts, task, crew, onward, r, code):
+    """Bring a run to where it takes its next step: GO_ON and its room there; or to its end, and its code.
+
+    The ``code`` is that with which it has come to its time, or ended; GO_ON where that is to be seen.
+    """
+    room = NO_ROOM
+    while True:
+        if code == GO_ON:
+            code, room = prepare(
+                parts, task, crew.cycles[r], crew.phases[r], crew.max_steps[r], crew.max_jumps[r]
+            )
+            if code == GO_ON:
+                return code, room
+        code = onward(parts, task, crew, r, code)
+        if code != GO_ON:
+            return code, room
+
+
+@njit(**KERNEL)
 def muster(parts, sea, crew, onward, r, left, row):
     """Bring a run to where it takes its next step, and let it wait there; or to its end.
 
     A run that goes on in the mode that it has ``left`` goes back into its lane, in that ``row``.
     """
     task = task_at(crew.tasks[r])
-    while True:
-        code, room = prepare(
-            parts, task, crew.cycles[r], crew.phases[r], crew.max_steps[r], crew.max_jumps[r]
-        )
-        if code == GO_ON:
-            break
-        code = onward(parts, task, crew, r, code)
-        if code != GO_ON:
-            crew.codes[r] = code
-            return
+    code, room = go_to_next_step(parts, task, crew, onward, r, GO_ON)
+    if code != GO_ON:
+        crew.codes[r] = code
+        return
     queue = crew.aboard.shape[0]
     if crew.refused[r] == 0 and is_plain(task.model, task.method, task.run, sea):
         queue = task.run.mode
@@ -182,30 +163,78 @@ def beyond(time, room):
     return 0.0 if time == room else time - room
 
 
-@njit(**KERNEL)
-def go_ashore(parts, sea, crew, mode, row, took, went):
-    """Let a run leave its lane: at the end of a step that it took, or where it was at the start.
-
-    Returns its number, and GO_ON or why it ends.
-    """
-    r, lane = crew.aboard[mode, row], sea.lanes[mode]
-    crew.aboard[mode, row] = -1
-    task = task_at(crew.tasks[r])
-    places = places_in(task.model, task.tangents, crew.parameters, mode)
-    left = lane[(places.numbers + ROOM) * ABREAST + row]
-    leave(lane, places, task, took, row)
-    if not took:
-        if (went >> row) & 1 and task.tangents > 0 and task.orthonormal != 0:
-            task.run.unchecked -= 1
-            parts.keep_apart(task.model, task.run, mode, task.tangents, task.work.jacobian)
-        return r, GO_ON
-    span = take_ashore(sea, task, row)
-    alone = reaches_one_guard(task.model, task.run)
-    # What is left of a time that ends with the room ends with it to the last bit.
+@njit(**INLINE)
+def room_left(sea, crew, places, mode, row):
+    """The room of a run in a lane. What is left of a time that ends with it ends with it to the last bit."""
+    r, left = crew.aboard[mode, row], sea.lanes[mode][(places.numbers + ROOM) * ABREAST + row]
     remains = left + beyond(crew.rooms[r, 0], crew.rooms[r, 2])
     until = left + beyond(crew.rooms[r, 1], crew.rooms[r, 2])
-    room = Room(remains, until, left, crew.rooms[r, 3], crew.clocks[r])
-    return r, complete(parts, task, room, span, crew.cycles[r], crew.phases[r], alone)
+    return Room(remains, until, left, crew.rooms[r, 3], crew.clocks[r])
+
+
+@njit(**KERNEL)
+def arrive(parts, sea, crew, onward, places, mode, row):
+    """Let a run leave its lane at the end of its step, and bring it to its next one."""
+    r, room = crew.aboard[mode, row], room_left(sea, crew, places, mode, row)
+    task, lane, fired, gap = task_at(crew.tasks[r]), sea.lanes[mode], sea.fired[row], 0.0
+    model, run = task.model, task.run
+    crew.aboard[mode, row] = NOBODY
+    on_guard = lane[(places.numbers + STEPS) * ABREAST + row] == 1.0 and remember_scale(model, run, task.work)
+    leave(lane, places, task, row)
+    # The last step is counted where vectors are looked at.
+    run.unchecked -= 1
+    run.distant = 1 if fired == NO_TRANSITION and (sea.distant >> row) & 1 else 0
+    if fired != NO_TRANSITION:
+        gap = reach(sea, task, on_guard, row)
+        go_forward(model, run, gap)
+    alone, length = reaches_one_guard(model, run), sea.ends[row] + gap
+    code = conclude(parts, task, room, gap, length, crew.cycles[r], crew.phases[r], alone)
+    if code != GO_ON:
+        code = onward(parts, task, crew, r, code)
+    if code != GO_ON:
+        crew.codes[r] = code
+        return
+    muster(parts, sea, crew, onward, r, mode, row)
+
+
+@njit(**KERNEL)
+def stop_on_the_way(parts, sea, crew, onward, places, mode, row):
+    """Let a run stop within its step; from there it goes on, to its next stop or to the end, or elsewhere."""
+    r, lane = crew.aboard[mode, row], sea.lanes[mode]
+    task = task_at(crew.tasks[r])
+    run, n, tangents = task.run, task.model.dimension, task.tangents
+    sea.stopping ^= 1 << row
+    look_out(sea, lane, places, task, sea.stops[ABREAST + row], row)
+    set_clock(run, crew.cycles[r], crew.phases[r])
+    entry, jumps = largest_of_tangent(run, n) if tangents > 0 else 0, run.jumps
+    before = run.y[entry]
+    code, room = go_to_next_step(parts, task, crew, onward, r, DONE if run.distant == 1 else GO_ON)
+    if code != GO_ON:
+        crew.codes[r], crew.aboard[mode, row] = code, NOBODY
+        return
+    # Another run has begun, a guard was reached, or the tangent vector is another one.
+    if run.steps == 0 or run.jumps > jumps or (tangents > 0 and before == 0.0):
+        crew.aboard[mode, row] = NOBODY
+        muster(parts, sea, crew, onward, r, mode, row)
+        return
+    factor = run.y[entry] / before if tangents > 0 else 1.0
+    look_ahead(sea, lane, places, task, room.all, factor, row)
+    sea.stops[ABREAST + row] *= factor
+    rest, reaches = sea.ends[row] - sea.stops[row], sea.fired[row] != NO_TRANSITION
+    if room.all < rest or (room.all == rest and not reaches):
+        sea.stops[row] += room.all
+        sea.stopping |= 1 << row
+    elif reaches:
+        arrive(parts, sea, crew, onward, places, mode, row)
+
+
+@njit(**KERNEL)
+def stay_behind(parts, sea, crew, onward, places, mode, row):
+    """Let a run that does not take the step leave its lane, and step alone."""
+    r = crew.aboard[mode, row]
+    crew.aboard[mode, row], crew.refused[r] = NOBODY, 1
+    leave(sea.lanes[mode], places, task_at(crew.tasks[r]), row)
+    muster(parts, sea, crew, onward, r, mode, row)
 
 
 @njit(**KERNEL)
@@ -216,27 +245,28 @@ def step_together(parts, sea, crew, onward, mode):
     for row in range(ABREAST):
         first = max(first, crew.aboard[mode, row])
     task, lane = task_at(crew.tasks[first]), sea.lanes[mode]
-    places = places_in(task.model, task.tangents, crew.parameters, mode)
-    able, going, staying = step_abreast(
-        task.model, task.method, sea, lane, places, mode, task.tangents, mask_of(bits)
-    )
-    took, went, stays = bits_of(able), bits_of(going), bits_of(staying)
+    model, method, tangents = task.model, task.method, task.tangents
+    places = places_in(model, tangents, crew.parameters, mode)
+    able, staying = step_abreast(model, method, sea, lane, places, mode, tangents, mask_of(bits))
+    took, stays, stopping = bits_of(able), bits_of(staying), sea.stopping
     for row in range(ABREAST):
         if not (bits >> row) & 1:
             continue
         crew.steps += 1
-        if (stays >> row) & 1 and lane[(places.numbers + STEPS) * ABREAST + row] < crew.longest[mode]:
-            continue
-        arrives = (took >> row) & 1 and not (went >> row) & 1
-        r, code = go_ashore(parts, sea, crew, mode, row, arrives, went)
+        steps = lane[(places.numbers + STEPS) * ABREAST + row]
         if not (took >> row) & 1:
-            crew.refused[r] = 1
-        if code != GO_ON:
-            code = onward(parts, task_at(crew.tasks[r]), crew, r, code)
-        if code != GO_ON:
-            crew.codes[r] = code
-            continue
-        muster(parts, sea, crew, onward, r, mode, row)
+            stay_behind(parts, sea, crew, onward, places, mode, row)
+        elif (stopping >> row) & 1:
+            # What was left at the start of the step.
+            sea.stops[row] = lane[(places.numbers + ROOM) * ABREAST + row] + sea.ends[row]
+            sea.stops[ABREAST + row] = 1.0
+        elif not ((stays >> row) & 1 and steps < crew.longest[mode]):
+            arrive(parts, sea, crew, onward, places, mode, row)
+    while sea.stopping != 0:
+        evaluate_stops(model, method, sea, lane, places, mode, tangents)
+        for row in range(ABREAST):
+            if (sea.stopping >> row) & 1:
+                stop_on_the_way(parts, sea, crew, onward, places, mode, row)
 
 
 @exported(INTEGER, ADVANCE, Parts, Abreast, Crew, ONWARD)

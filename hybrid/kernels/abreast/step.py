@@ -20,6 +20,7 @@ from hybrid.kernels.abreast.length import trusted_length, weigh
 from hybrid.kernels.abreast.rows import (
     bits_of,
     both,
+    either,
     entry_at,
     in_every_run,
     put_entry,
@@ -36,6 +37,7 @@ from hybrid.kernels.types.abreast import (
     CYCLE,
     DIVERGENCE,
     FOLLOWS,
+    LEADS_ON,
     LONGEST_STEP,
     LOW,
     PER_GUARD,
@@ -62,8 +64,8 @@ LONGEST = 1e100
 
 
 @njit(**INLINE)
-def evaluate_four(powers, column, order, h, with_sizes):
-    """Values at ``h`` of four columns into row ``order + 1``, and what they are sums of into the next.
+def evaluate_four(powers, column, order, h, with_sizes, end):
+    """Values at ``h`` of four columns into the row ``end``, and what they are sums of into the next.
 
     Each sum waits for itself: four run at once.
     """
@@ -80,20 +82,20 @@ def evaluate_four(powers, column, order, h, with_sizes):
             c, size_c = fused(c, h, term), fused(size_c, h, magnitude(term))
             term = entry_at(powers, o, column + 3)
             d, size_d = fused(d, h, term), fused(size_d, h, magnitude(term))
-        put_entry(powers, order + 2, column, size_a)
-        put_entry(powers, order + 2, column + 1, size_b)
-        put_entry(powers, order + 2, column + 2, size_c)
-        put_entry(powers, order + 2, column + 3, size_d)
+        put_entry(powers, end + 1, column, size_a)
+        put_entry(powers, end + 1, column + 1, size_b)
+        put_entry(powers, end + 1, column + 2, size_c)
+        put_entry(powers, end + 1, column + 3, size_d)
     else:
         for o in range(order - 1, -1, -1):
             a = fused(a, h, entry_at(powers, o, column))
             b = fused(b, h, entry_at(powers, o, column + 1))
             c = fused(c, h, entry_at(powers, o, column + 2))
             d = fused(d, h, entry_at(powers, o, column + 3))
-    put_entry(powers, order + 1, column, a)
-    put_entry(powers, order + 1, column + 1, b)
-    put_entry(powers, order + 1, column + 2, c)
-    put_entry(powers, order + 1, column + 3, d)
+    put_entry(powers, end, column, a)
+    put_entry(powers, end, column + 1, b)
+    put_entry(powers, end, column + 2, c)
+    put_entry(powers, end, column + 3, d)
 
 
 @njit(**INLINE)
@@ -116,34 +118,34 @@ def set_origins(sea, lane, places, n, order):
 
 
 @njit(**INLINE)
-def take_step(model, sea, lane, places, mode, tangents, order, going):
-    """Move the runs of a mask to the end of the step, where they go on."""
+def take_step(model, sea, lane, places, mode, tangents, order, able):
+    """Move the runs of a mask to the end of the step."""
     n, powers, rooted = model.dimension, sea.powers, holds_roots(model, mode)
     for i in range(n):
-        put_rows(lane, i, where(going, entry_at(powers, order + 1, i), rows_at(lane, i)))
+        put_rows(lane, i, where(able, entry_at(powers, order + 1, i), rows_at(lane, i)))
         size = rows_at(lane, places.sizes + i)
         # On a guard, rounding is that of the landing.
-        put_rows(lane, places.sizes + i, where(going, entry_at(powers, order + 2, i), size))
+        put_rows(lane, places.sizes + i, where(able, entry_at(powers, order + 2, i), size))
     for k in range(tangents):
         begin = sea.tangent_start + k * sea.tangent_columns[mode]
         for i in range(n):
             place = n * (1 + k) + i
-            put_rows(lane, place, where(going, entry_at(powers, order + 1, begin + i), rows_at(lane, place)))
+            put_rows(lane, place, where(able, entry_at(powers, order + 1, begin + i), rows_at(lane, place)))
     for g in range(places.count):
         place = places.guards + PER_GUARD * g
-        put_rows(lane, place + 1, where(going, 0.0, rows_at(lane, place + 1)))
+        put_rows(lane, place + 1, where(able, 0.0, rows_at(lane, place + 1)))
         if rooted:
             root = entry_at(powers, order + 1, n + g)
-            put_rows(lane, place + 2, where(going, root, rows_at(lane, place + 2)))
-    first, span = places.numbers, where(going, rows_at(sea.ends, 0), 0.0)
+            put_rows(lane, place + 2, where(able, root, rows_at(lane, place + 2)))
+    first, span = places.numbers, where(able, rows_at(sea.ends, 0), 0.0)
     move_clock(lane, first, span)
     put_rows(lane, first + SINCE, rows_at(lane, first + SINCE) + span)
     put_rows(lane, first + LONGEST_STEP, larger(rows_at(lane, first + LONGEST_STEP), span))
     put_rows(lane, first + ROOM, rows_at(lane, first + ROOM) - span)
-    put_rows(lane, first + STEPS, rows_at(lane, first + STEPS) + where(going, 1.0, 0.0))
-    put_rows(lane, first + FOLLOWS, where(going, 1.0, rows_at(lane, first + FOLLOWS)))
+    put_rows(lane, first + STEPS, rows_at(lane, first + STEPS) + where(able, 1.0, 0.0))
+    put_rows(lane, first + FOLLOWS, where(able, 1.0, rows_at(lane, first + FOLLOWS)))
     if tangents > 0:
-        change = where(going, entry_at(powers, order + 1, n + places.count + 1), 0.0)
+        change = where(able, entry_at(powers, order + 1, n + places.count + 1), 0.0)
         put_rows(lane, first + DIVERGENCE, rows_at(lane, first + DIVERGENCE) + change)
 
 
@@ -167,10 +169,9 @@ def move_clock(lane, first, span):
 
 @njit(**KERNEL)
 def step_abreast(model, method, sea, lane, places, mode, tangents, asked):
-    """One step of the runs of the mask ``asked`` in a mode; the masks of those that took it, and that go on.
+    """One step of the runs of the mask ``asked`` in a mode; the masks of those that took it, and may go on.
 
-    Those that do not go on have reached an event or the end of their room: the values at the end, and what
-    the state is a sum of, are left in the rows behind the series.
+    Those that may not go on have reached an event or the end of their room, or are late.
     """
     n, powers, kind = model.dimension, sea.powers, model.propagator[mode]
     exact, on_clock, rooted = kind == EXACT, kind == DESINGULARISED, holds_roots(model, mode)
@@ -189,8 +190,12 @@ def step_abreast(model, method, sea, lane, places, mode, tangents, asked):
         able = both(able, regular)
     remaining, t = rows_at(lane, first + ROOM), magnitude(rows_at(lane, first + T))
     rounding = FINEST * (t if model.timed[mode] == 1 else rows_at(lane, first + SINCE))
+    late = without(asked, asked)
+    if model.timed[mode] == 1:
+        late = method.rtol * rows_at(lane, first + LONGEST_STEP) < EPSILON * t
+    leads_on = without(rows_at(lane, first + LEADS_ON) > 0.5, late)
     if not on_clock:
-        room = smaller(remaining, longest_room(model, lane, places, mode))
+        room = smaller(where(leads_on, math.inf, remaining), longest_room(model, lane, places, mode))
         h = smaller(h, smaller(room, method.max_step))
         able = both(able, h < LONGEST)
     else:
@@ -207,12 +212,12 @@ def step_abreast(model, method, sea, lane, places, mode, tangents, asked):
     if tangents > 0:
         width = n + guards + 2
     for column in range(0, width, 4):
-        evaluate_four(powers, column, order, h, True)
+        evaluate_four(powers, column, order, h, column < n, order + 1)
     time = h
     if on_clock:
-        time, size = entry_at(powers, order + 1, n + guards), entry_at(powers, order + 2, n + guards)
+        time = entry_at(powers, order + 1, n + guards)
         # Beyond the end of the run, or so close to it that no step leads through what would be left.
-        able = both(able, time + fused(size, 4.0 * EPSILON, rounding) < remaining)
+        able = both(able, time + rounding < (1.0 - 64.0 * EPSILON) * remaining)
     able = both(able, time > rounding)
     total = in_every_run(0.0)
     for i in range(n):
@@ -220,14 +225,11 @@ def step_abreast(model, method, sea, lane, places, mode, tangents, asked):
     able = both(able, total < math.inf)
     for k in range(tangents):
         for column in range(start + k * stride, start + k * stride + n, 4):
-            evaluate_four(powers, column, order, h, False)
+            evaluate_four(powers, column, order, h, False, order + 1)
     put_rows(sea.ends, 0, time)
     put_rows(sea.ends, 1, h)
-    going = both(without(able, event), time < remaining)
-    take_step(model, sea, lane, places, mode, tangents, order, going)
-    if model.timed[mode] == 1:
-        late = method.rtol * rows_at(lane, first + LONGEST_STEP) < EPSILON * magnitude(
-            rows_at(lane, first + T)
-        )
-        return able, going, without(going, late)
-    return able, going, going
+    going = without(able, event)
+    passes, before = both(able, leads_on), time < remaining
+    sea.stopping = bits_of(without(both(passes, either(going, time > remaining)), before))
+    take_step(model, sea, lane, places, mode, tangents, order, able)
+    return able, without(both(going, either(before, leads_on)), late)

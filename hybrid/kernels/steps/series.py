@@ -326,16 +326,19 @@ def time_taken(path, remaining, finest, ends):
 
 
 @njit(**KERNEL)
-def land(model, run, tangents, fired, path, span, work):
-    """Bring the state at the end of a path onto the guard that ends it; returns the time that this takes."""
-    t, on_clock = path.start + span, path.clock >= 0
+def land(model, run, tangents, fired, t, stay, span, work):
+    """Bring the state at the end of a step onto the guard that ends it; returns the time that this takes.
+
+    The step ends at the time ``t`` of a ``stay`` in the mode, and has taken the time ``span``.
+    """
+    on_clock = model.propagator[run.mode] == DESINGULARISED
     if model.propagator[run.mode] == ROOTED:
         project_on_guard(model, run, fired, t, work)
         return 0.0
     if not on_clock and model.affine_guard[fired] == 1:
         return 0.0
     # What the error of the root makes of the time is less than the stay in the mode.
-    longest = run.since_entry + span if on_clock else CLOSE * span
+    longest = stay if on_clock else CLOSE * span
     moved = 0 if on_clock and model.guard_in_series[fired] == 1 else tangents
     return reach_guard(model, run, moved, fired, t, longest, work)
 
@@ -401,7 +404,8 @@ def series_step(task, remaining):
     if cut:
         sides_at(model, run, path.start + span, work)
     if fired != NO_TRANSITION:
-        span += land(model, run, tangents, fired, path, span, work)
+        stay = run.since_entry + span
+        span += land(model, run, tangents, fired, path.start + span, stay, span, work)
     return GO_ON, span
 
 

@@ -193,6 +193,37 @@ def test_rows_of_a_chart_are_spectra(k):
         np.testing.assert_allclose(chart.exponents.values[i], alone.exponents, rtol=1e-6, atol=1e-6)
 
 
+@pytest.mark.parametrize("count", [3, 40, 2000])
+@pytest.mark.parametrize("name", ["vibroimpact", "impact_oscillator", "boost_converter", "bilinear_oscillator"])
+def test_a_run_stops_within_its_steps(name, count):
+    """At times at which its state is kept, one or many of them in a step: they change nothing."""
+    system, ranges = RUNS[name]
+    starts, span = starts_of(system, ranges, 11), ranges["t_span"]
+    samples = np.linspace(*span, count)
+    options = {"executor": 1, "progress": False}
+    found = simulate_many(system, starts, span, samples=samples, **options)
+    without = simulate_many(system, starts, span, **options)
+    np.testing.assert_array_equal(found.jumps, without.jumps)
+    for i, x0 in enumerate(starts):
+        arc = simulate(system, x0, span, samples=samples)
+        size = np.abs(arc.x).max(axis=0) + 1e-3
+        assert (np.abs(found.x.values[i] - arc.x) / size).max() < 1e-8, i
+        assert np.abs(found.x_end.values[i] - without.x_end.values[i]).max() < 1e-8 * size.max()
+
+
+@pytest.mark.parametrize("interval", [0.05, 0.9, 20.0])
+@pytest.mark.parametrize("k", [1, None])
+def test_intervals_of_a_chart_end_within_steps(k, interval):
+    """The growth of tangent vectors over intervals shorter and longer than a step."""
+    system, start = models.impact_oscillator(), (0.0, 0.1)
+    options = {"k": k, "interval": interval, "intervals": 60, "transient": 10}
+    values = np.linspace(0.9, 2.8, 10)
+    chart = lyapunov.chart(system, {"w": values}, start, progress=False, **options)
+    for i in (0, 4, 9):
+        alone = lyapunov.lyapunov_spectrum(system, start, parameters={"w": values[i]}, **options)
+        np.testing.assert_allclose(chart.exponents.values[i], alone.exponents, rtol=1e-6, atol=1e-6)
+
+
 @pytest.mark.parametrize("w", [0.3, 40.0, 3e4, 3e6])
 def test_forcing_of_any_pace_from_the_origin(w):
     """A state that begins at zero says nothing of its size, and the unit of time nothing: a closed form."""
