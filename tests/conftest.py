@@ -6,12 +6,18 @@ from contextlib import suppress
 
 from hypothesis import HealthCheck, settings
 
+from hybrid.compiler.cache.loader import import_numba
+
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 # Tracing makes many small objects. Fewer searches for garbage among them save processor time.
 gc.set_threshold(20_000, 20, 20)
 
 pytest_plugins = ["tests.alone", "tests.nudge"]
+
+if os.environ.get("HYBRID_CPU"):
+    # Numba compiles for one processor in a process: for the chosen one, before a test calls it.
+    import_numba()
 
 
 def pytest_addoption(parser):
