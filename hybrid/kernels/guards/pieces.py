@@ -34,7 +34,7 @@ NO_COLUMN = -1
 # differ in their last digits only.
 NO_BETTER = 1.01
 # A place on a piece at a share of it that no jumps at simple shares meet.
-BESIDE = 0.3819660112501051
+ASIDE = 0.3819660112501051
 # Pieces longer than this share of the step are not tested for lying within the tolerances: a guard that has
 # no zero is then clear on most of the step without that test.
 SHORT_PIECE = 1e-2
@@ -366,7 +366,7 @@ def halves_tell_more(model, path, guard, piece, work):
     if not piece.width <= NO_BETTER * piece.spread:
         return True
     if piece.spread < math.inf:
-        beside = bounds_at(model, path, guard, piece.low + BESIDE * (piece.high - piece.low), work)
+        beside = bounds_at(model, path, guard, piece.low + ASIDE * (piece.high - piece.low), work)
         return not piece.width <= NO_BETTER * (beside.high_middle - beside.low_middle)
     # The guard may have no value in the middle, but one elsewhere.
     return _has_value(model, path, guard, piece.low, work) or _has_value(model, path, guard, piece.high, work)
