@@ -22,7 +22,7 @@ from hybrid.kernels.events.guards import (
 )
 from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.limit.go import may_accumulate
-from hybrid.kernels.steps.field.jumps import leave
+from hybrid.kernels.steps.field.jumps import note_start
 from hybrid.kernels.steps.field.late import is_late
 from hybrid.kernels.steps.series import series_step
 from hybrid.kernels.steps.step import rates_by_jacobian
@@ -120,7 +120,7 @@ def jump_at_tick(parts, task, fired):
 
 
 @njit(**KERNEL)
-def enter(parts, task):
+def enter_mode(parts, task):
     """Begin a stay in a mode: take the side of every guard; returns ``GO_ON``, or why the run ends."""
     model, run, mode = task.model, task.run, task.run.mode
     if not finite(run, model.dimension * (1 + task.tangents)):
@@ -244,7 +244,7 @@ def step(parts, task, remaining):
     on_guard = remember_scale(model, run, work)
     watched = task.tangents > 0 and model.abrupt[run.mode] == 1
     if watched:
-        leave(model, run, work)
+        note_start(model, run, work)
     code, span = step_by_propagator(parts, task, remaining)
     if code == GO_ON and watched:
         parts.look_back(model, task.method, run, span, work)
@@ -377,7 +377,7 @@ def prepare(parts, task, stop_cycle, stop_phase, max_steps, max_jumps):
                 return code, NO_ROOM
             continue
         if run.stage == ENTERING:
-            code = enter(parts, task)
+            code = enter_mode(parts, task)
             if code != GO_ON:
                 return code, NO_ROOM
             continue

@@ -18,7 +18,7 @@ from hybrid.compiler.compiled import CompiledSystem
 from hybrid.compiler.parts import ABREAST_SERIES, ABREAST_TANGENT_SERIES
 from hybrid.compiler.statements.code import LoweringError
 from hybrid.kernels.types import codes
-from hybrid.kernels.types.abreast import DEGREE, NUMBERS, PER_GUARD, Abreast
+from hybrid.kernels.types.abreast import DEGREE, LANE_NUMBERS, PER_GUARD, Abreast
 from hybrid.kernels.types.abreast import Crew as Memory
 from hybrid.kernels.types.structure import Layout
 from hybrid.simulation.memory import MOST_LAYOUTS
@@ -94,7 +94,7 @@ def _together(compiled: CompiledSystem, plan: Any, tangents: int) -> Together:
     n = system.dimension
     columns = emitted.tangent_start_abreast + tangents * max(strides) + SPARE_COLUMNS
     width, length = codes.ABREAST, n * (1 + tangents)
-    entries = length + len(system.parameters) + NUMBERS + n + PER_GUARD * guards
+    entries = length + len(system.parameters) + LANE_NUMBERS + n + PER_GUARD * guards
     shapes = {
         "counters": (3,),
         "powers": (codes.HIGHEST_ORDER + ROWS_OF_END + guards, max(columns, n + 2) * width),

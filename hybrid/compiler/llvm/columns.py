@@ -6,7 +6,7 @@ from typing import Any
 
 from hybrid.compiler.llvm.registers import parted
 from hybrid.kernels.instructions.loops import loop, variable
-from hybrid.kernels.instructions.registers import NUMBER, everywhere, multiply_add, read, vector_of, write
+from hybrid.kernels.instructions.registers import DOUBLE, everywhere, multiply_add, read, vector_of, write
 from hybrid.kernels.types.codes import NARROW, WIDE
 
 # In one sum, each term waits for the previous term: so there are two partial sums, of even and odd rows.
@@ -91,7 +91,7 @@ def _sums_at_once(
                 (left, place, width): read(builder, rows.beside(addresses[left], place), width)
                 for left, place, width in dict.fromkeys(keys)
             }
-        singles = {left: builder.load(address, typ=NUMBER) for left, address in addresses.items()}
+        singles = {left: builder.load(address, typ=DOUBLE) for left, address in addresses.items()}
         return {key: everywhere(builder, singles[key[0]], key[2]) for key in dict.fromkeys(keys)}
 
     nothing = [vector_of(width)([0.0] * width) for *_, width in registers]
@@ -135,7 +135,7 @@ def write_ends(
         if pairs:
             low, high = (read(builder, rows.beside(each, place), lanes) for each in (left_one, left_last))
         else:
-            ends = (builder.load(each, typ=NUMBER) for each in (left_one, left_last))
+            ends = (builder.load(each, typ=DOUBLE) for each in (left_one, left_last))
             low, high = (everywhere(builder, each, lanes) for each in ends)
         high = builder.select(differ, high, nothing)
         total = read(builder, rows.beside(here, place), lanes)
@@ -181,7 +181,7 @@ def write_combination_of_tangents(
     with loop(builder, number(0), order, number(1)):
         here, there = rows.walk(target, 1), rows.walk(source, 1)
         for i in range(n):
-            entries = [builder.load(rows.beside(there, width * j + i), typ=NUMBER) for j in range(n)]
+            entries = [builder.load(rows.beside(there, width * j + i), typ=DOUBLE) for j in range(n)]
             factors = [everywhere(builder, entry, NARROW) for entry in entries]
             write(builder, _weighted_sum(builder, factors, vectors), rows.beside(here, NARROW * i))
 
@@ -201,10 +201,10 @@ def write_spread(builder: Any, y: Any, length: Any, n: Any, rows: Any, first: An
             is_one = builder.icmp_signed("<", vector, count)
             column = builder.add(builder.add(first, builder.mul(group, stride)), number(lane))
             source = builder.select(is_one, builder.mul(number(n), builder.add(vector, number(1))), number(0))
-            start = builder.gep(y, [source], source_etype=NUMBER)
+            start = builder.gep(y, [source], source_etype=DOUBLE)
             target = rows.address(number(0), column)
             with loop(builder, number(0), number(n), number(1)) as i:
-                value = builder.load(builder.gep(start, [i], source_etype=NUMBER), typ=NUMBER)
+                value = builder.load(builder.gep(start, [i], source_etype=DOUBLE), typ=DOUBLE)
                 value = builder.select(is_one, value, value.type(0.0))
-                place = builder.gep(target, [builder.mul(i, number(NARROW))], source_etype=NUMBER)
+                place = builder.gep(target, [builder.mul(i, number(NARROW))], source_etype=DOUBLE)
                 builder.store(value, place)

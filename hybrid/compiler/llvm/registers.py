@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from llvmlite import ir
 
-from hybrid.kernels.instructions.registers import NUMBER, address_of_values, vector_of
+from hybrid.kernels.instructions.registers import DOUBLE, address_of_values, vector_of
 from hybrid.kernels.types.codes import NARROW, WIDE
 
 
@@ -27,7 +27,7 @@ def write_down(builder: Any, matrix: Any, row: Any, column: Any, stride: Any, la
     address = matrix.address(row, column)
     for lane in range(NARROW):
         builder.store(builder.extract_element(lanes, ir.IntType(32)(lane)), address)
-        address = builder.gep(address, [stride], source_etype=NUMBER)
+        address = builder.gep(address, [stride], source_etype=DOUBLE)
 
 
 def write_row(builder: Any, matrix: Any, row: Any, column: Any, numbers: Any) -> None:
@@ -36,8 +36,8 @@ def write_row(builder: Any, matrix: Any, row: Any, column: Any, numbers: Any) ->
     A processor stalls when it reads as one register what has just been written as two. So a row is written
     in registers as wide as those in which ``convolved`` reads it.
     """
-    if numbers[0].type == NUMBER:
-        numbers = [*numbers, *[NUMBER(0.0)] * (sum(widths(len(numbers))) - len(numbers))]
+    if numbers[0].type == DOUBLE:
+        numbers = [*numbers, *[DOUBLE(0.0)] * (sum(widths(len(numbers))) - len(numbers))]
         numbers = [four(builder, *numbers[i : i + NARROW]) for i in range(0, len(numbers), NARROW)]
     address, place = matrix.address(row, column), 0
     for width in widths(NARROW * len(numbers)):

@@ -7,7 +7,7 @@ from typing import Any
 from llvmlite import ir
 
 from hybrid.kernels.instructions.loops import declared
-from hybrid.kernels.instructions.registers import NUMBER, built_in, vector_of
+from hybrid.kernels.instructions.registers import DOUBLE, built_in, vector_of
 
 # Beyond this size the quadrant is no longer exact; there the functions of one number are called.
 LARGEST = 1e5
@@ -78,7 +78,7 @@ def _beyond(builder: Any, x: Any, value: Any, name: str) -> Any:
     builder.store(value, place)
     with builder.if_then(builder.not_(every), likely=False):
         exact = value.type(ir.Undefined)
-        function = declared(builder.module, ir.FunctionType(NUMBER, [NUMBER]), f"llvm.{name}.f64")
+        function = declared(builder.module, ir.FunctionType(DOUBLE, [DOUBLE]), f"llvm.{name}.f64")
         for lane in range(width):
             index = ir.IntType(32)(lane)
             number = builder.call(function, [builder.extract_element(x, index)])

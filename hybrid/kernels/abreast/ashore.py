@@ -12,7 +12,7 @@ from hybrid.kernels.abreast.lanes import clear_guards
 from hybrid.kernels.abreast.rows import bits_of, both, entry_at, rows_at
 from hybrid.kernels.abreast.step import evaluate_four
 from hybrid.kernels.drive import keep_scale
-from hybrid.kernels.steps.series import holds_roots, land, number_of_guards, order_of
+from hybrid.kernels.steps.series import holds_roots, land_series, number_of_guards, order_of
 from hybrid.kernels.types.abreast import CYCLE, DIVERGENCE, LONGEST_STEP, PER_GUARD, ROOM, SINCE, STEPS
 from hybrid.kernels.types.codes import ABREAST
 from hybrid.kernels.types.options import INLINE, KERNEL
@@ -85,14 +85,15 @@ def look_ahead(sea, lane, places, task, room, factor, row):
 
 
 @njit(**KERNEL)
-def reach(sea, task, on_guard, row):
+def reach_end(sea, task, on_guard, row):
     """Bring a run onto the guard that its step ends at; returns the time that this takes.
 
     The event is left pending. The step may have begun ``on_guard``.
     """
     run, fired = task.run, sea.fired[row]
     run.rehearsal[3, fired] = run.side[fired]
-    gap = land(task.model, run, task.tangents, fired, run.phase, run.since_entry, sea.ends[row], task.work)
+    stay, span = run.since_entry, sea.ends[row]
+    gap = land_series(task.model, run, task.tangents, fired, run.phase, stay, span, task.work)
     run.pending = fired
     keep_scale(task.model, run, on_guard, run.phase + gap, task.work)
     return gap

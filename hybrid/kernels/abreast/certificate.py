@@ -32,14 +32,14 @@ from hybrid.kernels.abreast.rows import (
     without,
 )
 from hybrid.kernels.arithmetic.wide import fused, smaller
-from hybrid.kernels.instructions.registers import NUMBER, everywhere, multiply_add, read
+from hybrid.kernels.instructions.registers import DOUBLE, everywhere, multiply_add, read
 from hybrid.kernels.types.abreast import DEGREE
 from hybrid.kernels.types.codes import ABREAST
 from hybrid.kernels.types.numba_door.building import intrinsic
 from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Pieces that are looked at, and the shortest one, as a share of the step.
-MOST_PIECES = 16
+MOST_PARTS = 16
 SHORTEST_PIECE = 0.01
 # What a power adds to each Bernstein coefficient: ``C(i, k) / C(DEGREE, k)`` in row ``i``.
 WEIGHTS = np.array(
@@ -78,7 +78,7 @@ def signs(typing_context, powers, side, band):
         for k in range(1, DEGREE + 1):
             power = _power(context, builder, signature.args[0], array, k)
             for i in range(k, DEGREE + 1):
-                weight = everywhere(builder, NUMBER(WEIGHTS[i, k]), ABREAST)
+                weight = everywhere(builder, DOUBLE(WEIGHTS[i, k]), ABREAST)
                 totals[i] = multiply_add(builder, power, weight, totals[i])
         values = [builder.fmul(total, side) for total in totals]
         before = [builder.fcmp_ordered(">", value, band) for value in values]
@@ -106,7 +106,7 @@ def certify(powers, side, band, asked, moved):
     begin, length = in_every_run(0.0), in_every_run(1.0)
     nobody = without(asked, asked)
     none, one = nobody, nobody
-    for piece in range(MOST_PIECES):
+    for piece in range(MOST_PARTS):
         if piece == 0:
             clear, changes = signs(powers, side, band)
         else:

@@ -32,13 +32,13 @@ LAST_TERMS = 5
 SLOW_SHARE = 1e-6
 SLOW_BANDS = 64.0
 # Two crossings closer than this share of the step, or than what so many bands hide, are taken for one.
-APART = 1e-9
+CROSSINGS_APART = 1e-9
 ZERO_BANDS = 4.0
 # Steps of Newton's method, with the first powers and with all; and the change, as a share of the place, below
 # which it is rounding.
 APPROACHES = 3
-MOST_CORRECTIONS = 16
-AT_ROOT = 4.0 * EPSILON
+MOST_NEWTON_STEPS = 16
+ROUNDING_OF_ROOT = 4.0 * EPSILON
 # What a landing has left of a guard may move the next one by this share of the time between them.
 MOST_LEFT = 0.1
 # A guard is far from zero if it is so many bands away.
@@ -87,7 +87,7 @@ def band_of(model, method, sea, clock, mode, slot, order, size, h, exact):
 
 
 @njit(**INLINE)
-def leading_powers(sea, column, order, size, known, h):
+def first_powers(sea, column, order, size, known, h):
     """The first powers of a guard on ``[0, 1]`` into ``sea.polynomial``; a bound for the others.
 
     A guard that is zero at the start is divided by its variable.
@@ -135,7 +135,7 @@ def root_in(sea, column, order, known, side, begin, length, h, found):
         x, _, low, high = corrected(value, rate, side, x, low, high)
     low, high = begin, begin + length
     settled, slope = without(found, found), in_every_run(1.0)
-    for _ in range(MOST_CORRECTIONS):
+    for _ in range(MOST_NEWTON_STEPS):
         place = x * h
         value, rate, bend = entry_at(powers, order, column), in_every_run(0.0), in_every_run(0.0)
         for o in range(order - 1, -1, -1):
@@ -151,7 +151,7 @@ def root_in(sea, column, order, known, side, begin, length, h, found):
         shift = nearer - x
         x = where(settled, x, nearer)
         # So much the next correction would be.
-        close = magnitude(bent) * shift * shift <= AT_ROOT * x
+        close = magnitude(bent) * shift * shift <= ROUNDING_OF_ROOT * x
         settled = either(settled, both(inside, close))
         if bits_of(without(found, settled)) == 0:
             break
@@ -212,7 +212,7 @@ def first_crossing(model, method, sea, lane, places, mode, order, h, exact, able
         asked = without(able, keeps)
         if bits_of(asked) == 0:
             continue
-        rest = leading_powers(sea, column, order, size, known, h)
+        rest = first_powers(sea, column, order, size, known, h)
         band = band + rest
         clear = rows_at(sea.polynomial, 0) * side > band
         none, one, begin, length = certify(sea.polynomial, side, band, both(asked, clear), sea.moved)
@@ -220,7 +220,7 @@ def first_crossing(model, method, sea, lane, places, mode, order, h, exact, able
             place, slope, one = root_in(sea, column, order, known, side, begin, length, h, one)
             steep = slope * side < -1.0 * larger(SLOW_SHARE * size, SLOW_BANDS * band)
             # Where one guard is zero, the other one is clear of zero.
-            width = larger(ZERO_BANDS * band / magnitude(slope), APART)
+            width = larger(ZERO_BANDS * band / magnitude(slope), CROSSINGS_APART)
             one = both(one, both(steep, magnitude(place - earliest) > larger(width, widest)))
             upwards, downwards = fires(model, mode, slot, 1), fires(model, mode, slot, -1)
             if upwards == NO_TRANSITION:

@@ -24,12 +24,12 @@ from hybrid.kernels.types.abreast import (
     CYCLE,
     DIVERGENCE,
     FOLLOWS,
+    LANE_NUMBERS,
     LEADS_ON,
     LONGEST_STEP,
-    LOW,
-    NUMBERS,
     PER_GUARD,
     PERIOD,
+    PHASE_LOW,
     ROOM,
     SINCE,
     STAY,
@@ -57,7 +57,7 @@ def places_in(model, tangents, parameters, mode):
     n = model.dimension
     first = n * (1 + tangents)
     numbers = first + parameters
-    sizes = numbers + NUMBERS
+    sizes = numbers + LANE_NUMBERS
     return Places(first, numbers, sizes, sizes + n, number_of_guards(model, mode))
 
 
@@ -81,7 +81,7 @@ def come_aboard(lane, places, task, room, row):
     for i in range(places.numbers - places.parameters):
         lane[(places.parameters + i) * ABREAST + row] = model.parameters[i]
     first = places.numbers * ABREAST + row
-    lane[first + T * ABREAST], lane[first + LOW * ABREAST] = run.phase, run.phase_low
+    lane[first + T * ABREAST], lane[first + PHASE_LOW * ABREAST] = run.phase, run.phase_low
     lane[first + CYCLE * ABREAST], lane[first + SINCE * ABREAST] = 0.0, run.since_entry
     lane[first + LONGEST_STEP * ABREAST], lane[first + ROOM * ABREAST] = run.longest_step, room
     beyond = AHEAD * run.stay[mode]
@@ -105,7 +105,7 @@ def come_aboard(lane, places, task, room, row):
 
 
 @njit(**KERNEL)
-def leave(lane, places, task, row):
+def leave_lane(lane, places, task, row):
     """Write where a run is at the end of its last step from a lane back to the run, clear of all guards."""
     model, run, method, series = task.model, task.run, task.method, task.work.series
     n, mode, order = model.dimension, run.mode, order_of(model, method, run.mode)
@@ -115,7 +115,7 @@ def leave(lane, places, task, row):
         return
     for i in range(places.parameters):
         run.y[i] = lane[i * ABREAST + row]
-    run.phase, run.phase_low = lane[first + T * ABREAST], lane[first + LOW * ABREAST]
+    run.phase, run.phase_low = lane[first + T * ABREAST], lane[first + PHASE_LOW * ABREAST]
     run.cycle += int(lane[first + CYCLE * ABREAST])
     run.since_entry, run.longest_step = lane[first + SINCE * ABREAST], lane[first + LONGEST_STEP * ABREAST]
     run.divergence += lane[first + DIVERGENCE * ABREAST]

@@ -20,13 +20,13 @@ from hybrid.kernels.steps.series_length import (
     BEFORE_TAIL,
     EXACT_TOLERANCE,
     FALL_OF_EXACT,
-    FINEST,
+    FINEST_OF_TANGENTS,
     LEAST_RISE,
     MOST_BITS,
     MOST_RISE,
     MOST_RISE_OF_EXACT,
-    SAFETY,
-    SHARE,
+    SAFETY_BITS,
+    SHARE_OF_LARGEST,
     TAIL,
     TAIL_OF_EXACT,
     TANGENT_SHARE,
@@ -44,17 +44,18 @@ def weigh(method, sea, n, controlled, tangents, start, stride, exact):
     if exact:
         for i in range(controlled):
             biggest = larger(magnitude(entry_at(powers, 0, i)), biggest)
-        floor = SHARE * rtol * biggest + TINY
+        floor = SHARE_OF_LARGEST * rtol * biggest + TINY
     for i in range(n):
         put_rows(sea.weights, i, 1.0 / (floor + rtol * magnitude(entry_at(powers, 0, i))))
     if not exact:
-        rtol = min(rtol, max(TANGENT_SHARE * rtol, FINEST))
+        rtol = min(rtol, max(TANGENT_SHARE * rtol, FINEST_OF_TANGENTS))
     for k in range(tangents):
         square, first = in_every_run(0.0), start + k * stride
         for i in range(controlled):
             component = entry_at(powers, 0, first + i)
             square = fused(component, component, square)
-        floor = ((SHARE * rtol if exact else rtol) / math.sqrt(controlled)) * square_root(square) + TINY
+        share = (SHARE_OF_LARGEST * rtol if exact else rtol) / math.sqrt(controlled)
+        floor = share * square_root(square) + TINY
         for i in range(n):
             component = magnitude(entry_at(powers, 0, first + i))
             put_rows(sea.weights, n * (1 + k) + i, 1.0 / (floor + rtol * component))
@@ -109,6 +110,6 @@ def trusted_length(method, sea, n, tangents, start, stride, order, exact):
     regular = both(rise >= LEAST_RISE, rise <= (MOST_RISE_OF_EXACT if exact else MOST_RISE))
     if not exact:
         regular = both(regular, newer - older <= 0.5 * TAIL * last)
-    length = powers_of_two(-1.0 * last - (0.0 if exact else SAFETY / (order - 1)))
+    length = powers_of_two(-1.0 * last - (0.0 if exact else SAFETY_BITS / (order - 1)))
     reach = 2.0 ** (MOST_BITS / order)
     return length, both(regular, both(length * reach > 1.0, length < reach))

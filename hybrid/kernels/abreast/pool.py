@@ -2,8 +2,8 @@
 
 from numba import njit
 
-from hybrid.kernels.abreast.ashore import evaluate_stops, largest_of_tangent, look_ahead, look_out, reach
-from hybrid.kernels.abreast.lanes import come_aboard, leave, places_in
+from hybrid.kernels.abreast.ashore import evaluate_stops, largest_of_tangent, look_ahead, look_out, reach_end
+from hybrid.kernels.abreast.lanes import come_aboard, leave_lane, places_in
 from hybrid.kernels.abreast.rows import bits_of, mask_of
 from hybrid.kernels.abreast.step import step_abreast
 from hybrid.kernels.arithmetic.clock import set_clock
@@ -40,7 +40,7 @@ NOBODY = -1
 
 
 @njit(**KERNEL)
-def is_plain(model, method, run, sea):
+def begins_plainly(model, method, run, sea):
     """Whether the next step of a run may be taken abreast, as far as its start tells."""
     mode = run.mode
     if sea.able[mode] == 0 or model.propagator[mode] == RUNGE_KUTTA:
@@ -103,7 +103,7 @@ def muster(parts, sea, crew, onward, r, left, row):
         crew.codes[r] = code
         return
     queue = crew.aboard.shape[0]
-    if crew.refused[r] == 0 and is_plain(task.model, task.method, task.run, sea):
+    if crew.refused[r] == 0 and begins_plainly(task.model, task.method, task.run, sea):
         queue = task.run.mode
         crew.rooms[r, 0], crew.rooms[r, 1] = room.remains, room.until
         crew.rooms[r, 2], crew.rooms[r, 3] = room.all, room.knot
@@ -180,12 +180,12 @@ def arrive(parts, sea, crew, onward, places, mode, row):
     model, run = task.model, task.run
     crew.aboard[mode, row] = NOBODY
     on_guard = lane[(places.numbers + STEPS) * ABREAST + row] == 1.0 and remember_scale(model, run, task.work)
-    leave(lane, places, task, row)
+    leave_lane(lane, places, task, row)
     # The last step is counted where vectors are looked at.
     run.unchecked -= 1
     run.distant = 1 if fired == NO_TRANSITION and (sea.distant >> row) & 1 else 0
     if fired != NO_TRANSITION:
-        gap = reach(sea, task, on_guard, row)
+        gap = reach_end(sea, task, on_guard, row)
         go_forward(model, run, gap)
     alone, length = reaches_one_guard(model, run), sea.ends[row] + gap
     code = conclude(parts, task, room, gap, length, crew.cycles[r], crew.phases[r], alone)
@@ -233,7 +233,7 @@ def stay_behind(parts, sea, crew, onward, places, mode, row):
     """Let a run that does not take the step leave its lane, and step alone."""
     r = crew.aboard[mode, row]
     crew.aboard[mode, row], crew.refused[r] = NOBODY, 1
-    leave(sea.lanes[mode], places, task_at(crew.tasks[r]), row)
+    leave_lane(sea.lanes[mode], places, task_at(crew.tasks[r]), row)
     muster(parts, sea, crew, onward, r, mode, row)
 
 

@@ -18,7 +18,7 @@ from hybrid.kernels.arithmetic.wide import (
     of_several,
     overload_operator,
 )
-from hybrid.kernels.instructions.registers import NUMBER, read, write
+from hybrid.kernels.instructions.registers import DOUBLE, read, write
 from hybrid.kernels.types.codes import ABREAST
 from hybrid.kernels.types.numba_door.building import intrinsic, unpack_tuple
 
@@ -49,7 +49,7 @@ def address_in(context, builder, kind, array, indices):
     place = builder.mul(last, last.type(ABREAST))
     for row in rows:
         place = builder.add(place, builder.mul(row, unpack_tuple(builder, made.shape)[1]))
-    return builder.gep(made.data, [place], source_etype=NUMBER)
+    return builder.gep(made.data, [place], source_etype=DOUBLE)
 
 
 @intrinsic

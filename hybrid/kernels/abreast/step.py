@@ -31,7 +31,8 @@ from hybrid.kernels.abreast.rows import (
 )
 from hybrid.kernels.arithmetic.clock import sum_in_two_parts
 from hybrid.kernels.arithmetic.wide import fused, larger, magnitude, smaller
-from hybrid.kernels.steps.series import FINEST, holds_roots, order_of
+from hybrid.kernels.steps.series import holds_roots, order_of
+from hybrid.kernels.steps.step import FINEST
 from hybrid.kernels.types.abreast import (
     AHEAD_OF_STAY,
     CYCLE,
@@ -39,9 +40,9 @@ from hybrid.kernels.types.abreast import (
     FOLLOWS,
     LEADS_ON,
     LONGEST_STEP,
-    LOW,
     PER_GUARD,
     PERIOD,
+    PHASE_LOW,
     ROOM,
     SINCE,
     STAY,
@@ -60,7 +61,7 @@ from hybrid.kernels.types.codes import (
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
-LONGEST = 1e100
+ANY_LENGTH = 1e100
 
 
 @njit(**INLINE)
@@ -107,7 +108,7 @@ def longest_room(model, lane, places, mode):
 
 
 @njit(**INLINE)
-def set_origins(sea, lane, places, n, order):
+def set_origins_abreast(sea, lane, places, n, order):
     """Tell the series what they may take the roots of guards from (``steps.series.set_origins``)."""
     follows = rows_at(lane, places.numbers + FOLLOWS) > 0.5
     for g in range(places.count):
@@ -153,7 +154,7 @@ def take_step(model, sea, lane, places, mode, tangents, order, able):
 def move_clock(lane, first, span):
     """``arithmetic.clock.forward`` of all runs."""
     phase, lost = sum_in_two_parts(rows_at(lane, first + T), span)
-    phase, low = sum_in_two_parts(phase, lost + rows_at(lane, first + LOW))
+    phase, low = sum_in_two_parts(phase, lost + rows_at(lane, first + PHASE_LOW))
     cycle, period = rows_at(lane, first + CYCLE), rows_at(lane, first + PERIOD)
     over = both(phase >= period, period > 0.0)
     while bits_of(over) != 0:
@@ -163,7 +164,7 @@ def move_clock(lane, first, span):
         cycle = cycle + where(over, 1.0, 0.0)
         over = both(phase >= period, period > 0.0)
     put_rows(lane, first + T, phase)
-    put_rows(lane, first + LOW, low)
+    put_rows(lane, first + PHASE_LOW, low)
     put_rows(lane, first + CYCLE, cycle)
 
 
@@ -179,11 +180,11 @@ def step_abreast(model, method, sea, lane, places, mode, tangents, asked):
     first, guards = places.numbers, places.count
     start, stride = sea.tangent_start, sea.tangent_columns[mode]
     if rooted:
-        set_origins(sea, lane, places, n, order)
+        set_origins_abreast(sea, lane, places, n, order)
     x = lane[: places.parameters * ABREAST]
     p = lane[places.parameters * ABREAST : first * ABREAST]
     sea.series(mode, lane[first * ABREAST :], x, p, order, powers)
-    able, h = asked, in_every_run(LONGEST)
+    able, h = asked, in_every_run(ANY_LENGTH)
     if degree == 0:
         weigh(method, sea, n, model.controlled, tangents, start, stride, exact)
         h, regular = trusted_length(method, sea, n, tangents, start, stride, order, exact)
@@ -197,9 +198,9 @@ def step_abreast(model, method, sea, lane, places, mode, tangents, asked):
     if not on_clock:
         room = smaller(where(leads_on, math.inf, remaining), longest_room(model, lane, places, mode))
         h = smaller(h, smaller(room, method.max_step))
-        able = both(able, h < LONGEST)
+        able = both(able, h < ANY_LENGTH)
     else:
-        h = smaller(h, LONGEST)
+        h = smaller(h, ANY_LENGTH)
     for row in range(sea.fired.shape[0]):
         sea.fired[row] = NO_TRANSITION
     event, sea.distant = without(asked, asked), bits_of(asked)

@@ -10,7 +10,7 @@ from numba import njit, types
 
 from hybrid.kernels.arithmetic.lanes import matrix_of
 from hybrid.kernels.instructions.registers import (
-    NUMBER,
+    DOUBLE,
     built_in,
     everywhere,
     multiply_add,
@@ -48,11 +48,11 @@ def gather_tangents(typing_context, series, order, n, first, stride, y):
             column = builder.add(builder.add(first, builder.mul(block, stride)), lane)
             source = rows.address(order, column)
             ahead = builder.mul(n, builder.add(each.index, number(1)))
-            begin = builder.gep(target.data, [ahead], source_etype=NUMBER)
+            begin = builder.gep(target.data, [ahead], source_etype=DOUBLE)
             with for_range(builder, n, intp=number) as component:
-                place = builder.gep(source, [builder.mul(component.index, lanes)], source_etype=NUMBER)
-                value = builder.load(place, typ=NUMBER)
-                builder.store(value, builder.gep(begin, [component.index], source_etype=NUMBER))
+                place = builder.gep(source, [builder.mul(component.index, lanes)], source_etype=DOUBLE)
+                value = builder.load(place, typ=DOUBLE)
+                builder.store(value, builder.gep(begin, [component.index], source_etype=DOUBLE))
         return context.get_dummy_value()
 
     return types.void(series, types.intp, types.intp, types.intp, types.intp, y), generate

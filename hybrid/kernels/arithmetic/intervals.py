@@ -24,7 +24,7 @@ GRID, LARGEST_ON_GRID = 2.0**20, 2.0**31
 # The slope of the error function at zero.
 SLOPE_OF_ERF = 2.0 / math.sqrt(math.pi)
 # The sine of an argument beyond this has no digits left.
-FAR = 1e14
+MOST_TURNS = 1e14
 
 
 @njit(**INLINE)
@@ -139,7 +139,7 @@ def fixed_power(low, high, exponent):
 @njit(**KERNEL)
 def cosine(low, high):
     """Range of the cosine."""
-    if not high - low < 2.0 * PI or abs(low) > FAR or abs(high) > FAR:
+    if not high - low < 2.0 * PI or abs(low) > MOST_TURNS or abs(high) > MOST_TURNS:
         return -1.0, 1.0
     least, most = min(math.cos(low), math.cos(high)), max(math.cos(low), math.cos(high))
     slack = ROUNDING * (abs(low) + abs(high))
@@ -159,7 +159,7 @@ def sine(low, high):
     """Range of the sine."""
     if low == 0.0 == high:
         return 0.0, 0.0
-    if not high - low < 2.0 * PI or abs(low) > FAR or abs(high) > FAR:
+    if not high - low < 2.0 * PI or abs(low) > MOST_TURNS or abs(high) > MOST_TURNS:
         return -1.0, 1.0
     one, other = math.sin(low), math.sin(high)
     least, most = widened(min(one, other), max(one, other), ROUNDING)
@@ -177,7 +177,7 @@ def sine(low, high):
 @njit(**KERNEL)
 def tangent_of(low, high):
     """Range of the tangent; the whole line around a pole."""
-    if not high - low < PI or abs(low) > FAR or abs(high) > FAR:
+    if not high - low < PI or abs(low) > MOST_TURNS or abs(high) > MOST_TURNS:
         return -math.inf, math.inf
     slack = ROUNDING * (abs(low) + abs(high))
     if math.floor((low - slack) / PI - 0.5) != math.floor((high + slack) / PI - 0.5):

@@ -11,7 +11,7 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 # Jumps below this share of the values at the knot are rounding.
 SMALL = 1e-9
 # Rounding of a cubic, in units of that of its terms.
-ROUNDING = 8.0 * EPSILON
+ROUNDING_OF_TABLE = 8.0 * EPSILON
 # The first and the last piece end here.
 FAR = 1e300
 
@@ -54,7 +54,7 @@ def _bounds_of_piece(data, row, degree, order, left, right):
     )
     one, two = value + slope / 3.0, value + (2.0 * slope + bend) / 3.0
     end = value + slope + bend + third
-    slack = ROUNDING * (abs(a) + far * (abs(b) + far * (abs(c) + far * abs(d))))
+    slack = ROUNDING_OF_TABLE * (abs(a) + far * (abs(b) + far * (abs(c) + far * abs(d))))
     return min(min(value, one), min(two, end)) - slack, max(max(value, one), max(two, end)) + slack
 
 

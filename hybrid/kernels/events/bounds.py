@@ -33,7 +33,7 @@ from hybrid.kernels.types.layout import EPSILON, Path, Programs
 from hybrid.kernels.types.options import INLINE, KERNEL, exported
 
 # Over a radius this large the mean value theorem makes no range narrower.
-FAR = 1e300
+ANY_RADIUS = 1e300
 
 
 @njit(**INLINE)
@@ -355,7 +355,7 @@ def spread_by_rounding(programs, transition, t, clock, x, scale, share, register
             row[LEAST_SLOPE], row[MOST_SLOPE] = -spread, spread
         else:
             _constant_leaf(programs, place, row)
-    last = registers[_run(programs, transition, registers, FAR)]
+    last = registers[_run(programs, transition, registers, ANY_RADIUS)]
     distance = max(last[HIGH_MIDDLE] - last[LOW], last[HIGH] - last[LOW_MIDDLE])
     if last[MOST_SLOPE] - last[LEAST_SLOPE] < math.inf:
         return distance

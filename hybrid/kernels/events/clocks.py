@@ -23,7 +23,7 @@ from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Relative rounding of a time that a user computes, and of the number that it is compared with.
-ROUNDED = 2 * EPSILON
+ROUNDING_OF_TICK = 2 * EPSILON
 
 
 @njit(**IN_ORDER)
@@ -63,11 +63,11 @@ def rounding_of_tick(model, run, transition, k):
     """
     kind, first = model.clock[transition], model.first_tick[transition]
     if kind == EVERY:
-        return ROUNDED * (abs(k * run.ticks[first]) + abs(run.ticks[first + 1]))
+        return ROUNDING_OF_TICK * (abs(k * run.ticks[first]) + abs(run.ticks[first + 1]))
     if kind == AT:
-        return ROUNDED * abs(run.ticks[first + min(k, model.first_tick[transition + 1] - first - 1)])
+        return ROUNDING_OF_TICK * abs(run.ticks[first + min(k, model.first_tick[transition + 1] - first - 1)])
     entry = run.entry_cycle * model.period + run.entry_phase
-    return ROUNDED * (abs(entry) + run.ticks[first])
+    return ROUNDING_OF_TICK * (abs(entry) + run.ticks[first])
 
 
 @njit(**KERNEL)

@@ -28,13 +28,13 @@ from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
 # The guard of an event is beyond zero by this share of its band, one and a half units in the last place.
-BEYOND = 1.5 / ROUNDING_OF_STATE
+MOST_BEYOND = 1.5 / ROUNDING_OF_STATE
 # The next number beyond a guard that is exactly zero, and so has no rounding.
 NEXT_TO_ZERO = 1e-200
 # A landing is no farther from its guard, or from its jump, than so many times the rounding of the state.
-FARTHEST = 64.0
+MOST_BANDS = 64.0
 # The flow goes on through the guard if its speed keeps this share on the way.
-KEPT = 0.5
+SPEED_KEPT = 0.5
 
 
 @njit(**KERNEL)
@@ -46,7 +46,7 @@ def _is_beyond(model, run, transition, side, t, x, work):
     if may_jump(model, run, transition, t, x, work):
         return True
     model.guard_gradient(transition, t, x, model.parameters, work.gradient)
-    return value >= BEYOND * rounding_band(model, run, transition, t, x, work)
+    return value >= MOST_BEYOND * rounding_band(model, run, transition, t, x, work)
 
 
 @njit(**KERNEL)
@@ -56,14 +56,14 @@ def _distance_beyond(model, run, transition, side, t, work):
     A little farther than needed: the place is rounded, too.
     """
     value = guard_value(model, transition, t, run.y, work.scalar) * side
-    return 1.5 * BEYOND * rounding_band(model, run, transition, t, run.y, work) + NEXT_TO_ZERO - value
+    return 1.5 * MOST_BEYOND * rounding_band(model, run, transition, t, run.y, work) + NEXT_TO_ZERO - value
 
 
 @njit(**KERNEL)
 def _goes_on(model, transition, mode, t, x, side, speed, work):
     """Whether a guard keeps its ``speed`` up to ``x``, as at a crossing deeper than its rounding."""
     model.field(mode, t, x, model.parameters, work.field_after)
-    return guard_speed(model, transition, t, x, work.field_after, work.gradient) * side >= KEPT * speed
+    return guard_speed(model, transition, t, x, work.field_after, work.gradient) * side >= SPEED_KEPT * speed
 
 
 @njit(**KERNEL)
@@ -101,8 +101,8 @@ def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, work):
     if not jumps and 0.0 < speed < math.inf and 0.0 < distance < math.inf:
         span = distance / speed
     # A landing takes no longer than the stay that it ends.
-    longest = max(run.since_entry, FARTHEST * EPSILON * size_of_time(model, t))
-    farthest = min(max(2.0 * span, FARTHEST * moment), longest)
+    longest = max(run.since_entry, MOST_BANDS * EPSILON * size_of_time(model, t))
+    farthest = min(max(2.0 * span, MOST_BANDS * moment), longest)
     if span == 0.0 or model.affine_guard[transition] == 0:
         # At a jump or a flat root the speed is no measure of the way.
         span = min(_shortest_span(model, run, t, work), longest)
@@ -150,7 +150,7 @@ def land_beyond(model, run, transition, side, stop_cycle, stop_phase, work):
     if not jumps:
         value = guard_value(model, transition, t, run.y, work.scalar)
         model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
-        if not abs(value) <= FARTHEST * rounding_band(model, run, transition, t, run.y, work):
+        if not abs(value) <= MOST_BANDS * rounding_band(model, run, transition, t, run.y, work):
             return
     for i in range(model.dimension):
         work.error[i], run.scale[i] = run.scale[i], abs(run.y[i])

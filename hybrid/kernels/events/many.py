@@ -86,7 +86,7 @@ def begin_next(parts, task, starts):
     return run.mode
 
 
-is_plain = njit(**KERNEL)(notes.is_plain)
+ends_plainly = njit(**KERNEL)(notes.is_plain)
 
 
 @exported(INTEGER, Parts, Task, Crew, INTEGER, INTEGER)
@@ -108,7 +108,7 @@ def sampled(parts, task, crew, r, code):
         starts.found[i, 2] = s
         if s > last:
             starts.found[i, 0], starts.found[i, 1] = run.mode, run.jumps
-            if not is_plain(task.model, run, guards_beyond(starts.named, starts.verdicts)):
+            if not ends_plainly(task.model, run, guards_beyond(starts.named, starts.verdicts)):
                 return DONE
     if code == GO_ON or s > last:
         s = 0

@@ -32,14 +32,14 @@ from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Relative rounding of a state.
-SHARE = ROUNDING_OF_STATE * EPSILON
+ROUNDING_SHARE = ROUNDING_OF_STATE * EPSILON
 # Each moment is so many times as long as the last.
 LONGER = 16.0
 # A guard leaves zero by its speed if that keeps this share of itself until the guard is out of its rounding:
 # at a steady acceleration, what it takes to get there.
-KEPT = 0.5
+KEPT_ON_THE_WAY = 0.5
 # The longest moment, in units of the time in which the state changes by its size or a feedback acts.
-LONGEST = EPSILON**0.2
+LONGEST_MOMENT = EPSILON**0.2
 
 
 class Place(NamedTuple):
@@ -90,8 +90,8 @@ def speed_rounding(model, run, transition, mode, t, x, work):
     for residue in range(model.first_residue[mode], model.first_residue[mode + 1]):
         slope = abs(gradient[model.residue_component[residue]])
         if slope != 0.0:
-            cancelling += slope * spread_of_terms(model, run, first + residue, SHARE, t, x, work)
-    return SHARE * total + cancelling
+            cancelling += slope * spread_of_terms(model, run, first + residue, ROUNDING_SHARE, t, x, work)
+    return ROUNDING_SHARE * total + cancelling
 
 
 @njit(**KERNEL)
@@ -124,7 +124,7 @@ def keeps_speed(model, transition, place, speed, moment, work):
         work.settled[i] = x[i] + moment * work.field[i]
     model.field(mode, t + moment, work.settled, model.parameters, work.field_after)
     there = guard_speed(model, transition, t + moment, work.settled, work.field_after, work.gradient)
-    return there * speed > KEPT * speed * speed
+    return there * speed > KEPT_ON_THE_WAY * speed * speed
 
 
 @njit(**KERNEL)
@@ -159,7 +159,7 @@ def sign_at_speed(model, run, transition, place, way, speed, band, error, work):
     moment *= LONGER
     model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
     longest, feedback = unit_of_time(model, run, work), pace_of_feedback(model, mode, work.jacobian)
-    longest = LONGEST * error**0.2 * (min(longest, 1.0 / feedback) if feedback > 0.0 else longest)
+    longest = LONGEST_MOMENT * error**0.2 * (min(longest, 1.0 / feedback) if feedback > 0.0 else longest)
     if not drift < math.inf:
         drift = 0.0
     while 0.0 < moment <= longest < math.inf:
@@ -190,7 +190,7 @@ def sign_of_speed(model, run, transition, place, work):
     for i in range(n):
         beside[i] = x[i]
     for i in range(n + 1 if model.affine_guard[transition] == 0 else 0):
-        for way in (-SHARE, SHARE):
+        for way in (-ROUNDING_SHARE, ROUNDING_SHARE):
             later = t
             if i < n:
                 beside[i] = x[i] + way * run.scale[i]

@@ -6,7 +6,7 @@ from hybrid.kernels.types.layout import EPSILON, Path
 from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Rounding error of a state or a time, as a multiple of EPSILON times its size.
-ROUNDING = 16.0
+ROUNDING_OF_START = 16.0
 
 
 @njit(**INLINE)
@@ -70,4 +70,4 @@ def rounding_of_start(path, n, scale, time_scale):
     rate = pace_at_start(path)
     if rate > 0.0:
         place = max(place, time_scale / rate)
-    return ROUNDING * EPSILON * place
+    return ROUNDING_OF_START * EPSILON * place

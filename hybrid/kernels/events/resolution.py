@@ -15,7 +15,7 @@ UNDERFLOW = 1e-250
 # Speeds as near to a guard as its rounding, and so many times farther, tell how the speed grows with the
 # distance. Below this share of proportional growth the state reaches the guard in finite time.
 FARTHER = 16.0
-SHARE = 0.5
+PROPORTIONAL = 0.5
 
 
 @njit(**INLINE)
@@ -139,7 +139,7 @@ def draws_state(model, run, transition, mode, t, x, value, work):
     for _ in range(2):
         near = side * speed_beside(model, transition, mode, t, x, value, side * distance, work)
         far = side * speed_beside(model, transition, mode, t, x, value, side * FARTHER * distance, work)
-        if not SHARE * FARTHER * near < far < 0.0:
+        if not PROPORTIONAL * FARTHER * near < far < 0.0:
             return False
         side = -side
     return True

@@ -32,7 +32,7 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 # How the state came to this point: the run starts here, the flow led here, or a reset put the state here.
 STARTED, FLOWED, LANDED = range(3)
 # A reset that keeps less than this share of a guard's speed holds a state that the flow pushes through it.
-KEPT = 1e-3
+KEPT_BY_RESET = 1e-3
 # A landing may lie so many moments of rounding beyond its guard (``landing``).
 LANDED_BY = 4096.0
 
@@ -206,7 +206,7 @@ def is_held(model, run, place, transition, towards, work):
         kept += work.gradient[i] * work.field_after[i]
     model.field(mode, t, x, model.parameters, work.field)
     # Without products of speeds, which may be too small for a number.
-    return speed > 0.0 and not kept * way > KEPT * speed
+    return speed > 0.0 and not kept * way > KEPT_BY_RESET * speed
 
 
 @njit(**KERNEL)

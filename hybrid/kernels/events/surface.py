@@ -16,7 +16,7 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 
 # A guard is looked at so far before and behind its crossing, as shares of a unit of time: the longest tells
 # of flat roots and jumps, the others of smooth guards that bend.
-BESIDE = 1e-7
+BESIDE_SURFACE = 1e-7
 CLOSER = 1e-3
 LOOKS = 3
 # The speeds of a smooth guard beside the crossing are as far above that there as below it, up to this share,
@@ -24,14 +24,14 @@ LOOKS = 3
 SMOOTH = 1e-3
 # A guard jumps if it changes by so many times what its speeds and rounding explain, and by more than a share
 # of that over a smaller time.
-UNEXPLAINED = 1e3
+UNEXPLAINED_JUMP = 1e3
 JUMPS = 0.5
-ROUNDING = 8.0 * EPSILON
+SHAKEN_BY = 8.0 * EPSILON
 # Parallels to the path have this distance, as a share of the state. The jump on them is looked for up to this
 # share of the unit of time.
-APART = 1e-5
-FARTHEST = 0.1
-HALVINGS = 60
+PARALLELS_APART = 1e-5
+FARTHEST_JUMP = 0.1
+HALVINGS_OF_PARALLEL = 60
 
 
 @njit(**INLINE)
@@ -84,7 +84,7 @@ def time_of_jump(model, transition, t, x, parallel, reach, rises, work):
             value_on_parallel(model, transition, t, x, low, i, shift, work) * rises < 0.0
             and value_on_parallel(model, transition, t, x, high, i, shift, work) * rises > 0.0
         ):
-            for _ in range(HALVINGS):
+            for _ in range(HALVINGS_OF_PARALLEL):
                 middle = 0.5 * (low + high)
                 if value_on_parallel(model, transition, t, x, middle, i, shift, work) * rises < 0.0:
                     low = middle
@@ -99,11 +99,11 @@ def time_of_jump(model, transition, t, x, parallel, reach, rises, work):
 def plane_of_jump(model, transition, t, x, unit, shortest, rises, work):
     """Whether the surface of a jump has a tangent plane; a gradient of speed 1 into ``work.gradient``."""
     n, gradient = model.dimension, work.stages[0]
-    longest, total = FARTHEST * unit, 1.0
+    longest, total = FARTHEST_JUMP * unit, 1.0
     for i in range(n):
-        shift = APART * weight(x, unit, i, work)
+        shift = PARALLELS_APART * weight(x, unit, i, work)
         if shift == 0.0:
-            shift = APART
+            shift = PARALLELS_APART
         before = time_of_jump(model, transition, t, x, (i, -shift), (shortest, longest), rises, work)
         after = time_of_jump(model, transition, t, x, (i, shift), (shortest, longest), rises, work)
         gradient[i] = 0.5 * (before - after) / shift
@@ -141,7 +141,7 @@ def value_and_noise(model, transition, t, x, s, work):
     """The guard at the time ``s`` on the path, and what rounding of the state makes of it."""
     value = value_on_parallel(model, transition, t, x, s, 0, 0.0, work)
     for i in range(model.dimension):
-        work.state[i] *= 1.0 + (ROUNDING if i % 2 == 0 else -ROUNDING)
+        work.state[i] *= 1.0 + (SHAKEN_BY if i % 2 == 0 else -SHAKEN_BY)
     return value, abs(guard_value(model, transition, t + s, work.state, work.scalar) - value)
 
 
@@ -154,7 +154,8 @@ def jumps_across(model, transition, t, x, s, explained, work):
     before, noise_before = value_and_noise(model, transition, t, x, -s, work)
     behind, noise_behind = value_and_noise(model, transition, t, x, s, work)
     change = behind - before
-    if not before * behind < 0.0 or not abs(change) > UNEXPLAINED * (explained + noise_before + noise_behind):
+    explained += noise_before + noise_behind
+    if not before * behind < 0.0 or not abs(change) > UNEXPLAINED_JUMP * explained:
         return 0
     close = CLOSER * s
     near = value_on_parallel(model, transition, t, x, close, 0, 0.0, work)
@@ -165,7 +166,7 @@ def jumps_across(model, transition, t, x, s, explained, work):
 
 
 @njit(**KERNEL)
-def unit_of_time(model, x, work):
+def unit_of_path(model, x, work):
     """The time in which the state changes by its size; components at rest have no say."""
     size, pace = 0.0, 0.0
     for i in range(model.dimension):
@@ -184,8 +185,8 @@ def finds_surface(model, transition, t, x, speed, work):
     """
     if model.affine_guard[transition] == 1:
         return False
-    unit, finest = unit_of_time(model, x, work), EPSILON / CLOSER * abs(t)
-    s, found, smooth = BESIDE * unit, False, False
+    unit, finest = unit_of_path(model, x, work), EPSILON / CLOSER * abs(t)
+    s, found, smooth = BESIDE_SURFACE * unit, False, False
     for _ in range(LOOKS):
         s = max(s, finest)
         before = speed_on_path(model, transition, t, x, -s, work)
@@ -200,7 +201,7 @@ def finds_surface(model, transition, t, x, speed, work):
             break
         s *= CLOSER
     if not smooth and not found:
-        found = plane_beside(model, transition, t, x, unit, max(BESIDE * unit, finest), work)
+        found = plane_beside(model, transition, t, x, unit, max(BESIDE_SURFACE * unit, finest), work)
     if not found:
         model.guard_gradient(transition, t, x, model.parameters, work.gradient)
     return found

@@ -24,7 +24,7 @@ from hybrid.kernels.types.options import KERNEL
 # The least share of a step that is looked at is a half to this power.
 MOST_HALVINGS = 50
 # The error of an interpolant is at most so many times the tolerances.
-MARGIN = 100.0
+MOST_ERROR = 100.0
 # Number of places at which a guard is evaluated that could not be traced.
 PLACES = 8
 
@@ -68,7 +68,7 @@ def hidden_until(model, method, run, path, guard, end, work):
     if guard.on_guard == AT_REST and size < math.inf:
         # What is zero at the start and rests there has a size and rounding on the step.
         rounding += ROUNDING_OF_STATE * EPSILON * size
-    noise = rounding + min(max(error, abs(end)), MARGIN * error)
+    noise = rounding + min(max(error, abs(end)), MOST_ERROR * error)
     place, farthest = length, size
     for _ in range(MOST_HALVINGS):
         if farthest <= noise:

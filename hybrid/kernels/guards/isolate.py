@@ -46,7 +46,7 @@ from hybrid.kernels.guards.pieces import (
     place_of_change,
     turn_on,
 )
-from hybrid.kernels.guards.sampled import SETTLED, sampled_change
+from hybrid.kernels.guards.sampled import AT_START, sampled_change
 from hybrid.kernels.guards.touch import note_touch
 from hybrid.kernels.types.kinds import INTEGER, REAL, Pair
 from hybrid.kernels.types.layout import Method, Model, Path, Run, Work
@@ -133,7 +133,7 @@ def _first_place(model, run, path, on_guard, hidden):
     """The place of a path from which on the signs of a guard tell anything."""
     if on_guard == 0:
         return 0.0
-    place = max(hidden, SETTLED * path.length)
+    place = max(hidden, AT_START * path.length)
     if on_guard == LATER and not hidden > 0.0:
         # By rounding the state may still be before the jump.
         beyond = rounding_of_start(path, model.dimension, run.scale, size_of_time(model, path.start))
@@ -225,7 +225,7 @@ def first_change(model, method, run, path, guard, hidden, work):
             continue
         if after != side and side != 0:
             place = place_of_change(model, path, guard, piece.low, high, work)
-            early = place <= SETTLED * length
+            early = place <= AT_START * length
             if not (early and (fired or _returns(model, run, path, guard, work))):
                 if crosses_towards(model.direction[transition], after):
                     return place, after, length

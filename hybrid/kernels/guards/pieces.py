@@ -13,7 +13,7 @@ from hybrid.kernels.events.bounds import bound_state
 from hybrid.kernels.events.guards import guard_value
 from hybrid.kernels.events.onset import AT_REST, BY_SPEED
 from hybrid.kernels.events.path import state_at, time_at
-from hybrid.kernels.guards.touch import APART
+from hybrid.kernels.guards.touch import TOUCHES_APART
 from hybrid.kernels.types.codes import (
     HIGH,
     HIGH_MIDDLE,
@@ -300,7 +300,7 @@ def _turn_between(model, path, guard, low, high, work):
     """
     side, end = guard.side, high
     if high == path.length:
-        high *= 1.0 + APART
+        high *= 1.0 + TOUCHES_APART
     at = bounds_at(model, path, guard, high, work)
     if not (at.most_slope if side > 0 else -at.least_slope) >= 0.0:
         return NOWHERE

@@ -13,7 +13,7 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 # Safety factor for the estimated error of the last step towards a root, which leaves out higher derivatives.
 UNSEEN = 64.0
 # Below this share of a root a step of Newton's method is so short that the next one would be rounding.
-SETTLED = 1e-8
+SETTLED_STEP = 1e-8
 # Most steps of Newton's method from a root without to one with what is zero at the start up to rounding.
 MOST_CORRECTIONS = 60
 
@@ -125,7 +125,7 @@ def simple_root_of(path, column, known_roots, bracket, side):
             shift /= 1.0 + shift * curve
         closer, change = s + shift, abs(shift)
         # The steps of the method shrink here; a step that does not shrink is rounding.
-        if change <= EPSILON * s or (last < SETTLED * s and change > 0.25 * last):
+        if change <= EPSILON * s or (last < SETTLED_STEP * s and change > 0.25 * last):
             return s
         if low < closer < high:
             if UNSEEN * ((abs(curve) + 1.0 / path.length) * change) ** 2 * change <= EPSILON * s:

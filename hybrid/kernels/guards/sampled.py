@@ -9,7 +9,7 @@ from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
 # A guard that is zero at the start of the step is searched from this share of the step on.
-SETTLED = 64.0 * EPSILON
+AT_START = 64.0 * EPSILON
 # Number of parts of a step; a guard that could not be traced is evaluated at their ends.
 SAMPLES = 32
 
@@ -39,7 +39,7 @@ def sampled_change(model, run, path, guard, hidden, work):
                 else:
                     right = middle
             side = -side
-            again = right <= SETTLED * length and has_just_fired(run, transition, on_guard)
+            again = right <= AT_START * length and has_just_fired(run, transition, on_guard)
             if crosses_towards(direction, side) and not again:
                 return right, side, length
             if not again:

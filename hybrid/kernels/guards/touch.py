@@ -13,7 +13,7 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 # A step is cut at this share of the way from its first touch to its second one: the middle may be a crossing.
 CUT = 0.3819
 # Share of a step between two touches. Closer ones are the same: two transitions may watch one guard.
-APART = 1e-6
+TOUCHES_APART = 1e-6
 
 
 @njit(**INLINE)
@@ -26,11 +26,11 @@ def forget_touches(run):
 def note_touch(run, transition, place, value):
     """Keep the first touch of the step, and the place of the second one; ``place`` is a share of the step."""
     if place < run.grazing_place:
-        if place < run.grazing_place - APART:
+        if place < run.grazing_place - TOUCHES_APART:
             run.next_grazing = run.grazing_place
         run.grazing_place, run.grazing_value = place, value
         run.grazing_guard = transition
-    elif place > run.grazing_place + APART:
+    elif place > run.grazing_place + TOUCHES_APART:
         run.next_grazing = min(run.next_grazing, place)
 
 
@@ -48,8 +48,8 @@ def remember_touch(model, run, record, place, time, work):
     A touch at the start of a step has been recorded if the last step ended with it.
     """
     transition, step = run.grazing_guard, run.steps - run.rejected
-    again = place <= APART and run.touched_step == step - 1 and run.touched_guard == transition + 1
-    if place >= 1.0 - APART:
+    again = place <= TOUCHES_APART and run.touched_step == step - 1 and run.touched_guard == transition + 1
+    if place >= 1.0 - TOUCHES_APART:
         run.touched_step, run.touched_guard = step, transition + 1
     if not again and allowed(model, transition, time, work.state, work.scalar):
         keep_grazing(model, run, record, transition, time, work.state, run.grazing_value, work)

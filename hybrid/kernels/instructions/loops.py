@@ -4,7 +4,7 @@ from contextlib import contextmanager
 
 from llvmlite import ir
 
-TRUTH = ir.IntType(1)
+BIT = ir.IntType(1)
 
 
 def declared(module, kind, name):

@@ -5,12 +5,12 @@ from llvmlite import ir
 from hybrid.kernels.instructions.loops import declared, variable
 
 FUSED = ("contract",)
-NUMBER = ir.DoubleType()
+DOUBLE = ir.DoubleType()
 
 
 def vector_of(width):
     """The type of a register of ``width`` numbers."""
-    return ir.VectorType(NUMBER, width)
+    return ir.VectorType(DOUBLE, width)
 
 
 def everywhere(builder, number, width):
@@ -43,7 +43,7 @@ class Matrix:
         """Address of an entry."""
         builder = self.builder
         place = builder.add(builder.mul(row, self.columns), column)
-        return builder.gep(self.data, [place], source_etype=NUMBER)
+        return builder.gep(self.data, [place], source_etype=DOUBLE)
 
     def walker(self, row, column):
         """A variable that holds the address of an entry."""
@@ -54,12 +54,12 @@ class Matrix:
         builder = self.builder
         here = builder.load(walker)
         further = builder.mul(self.columns, self.columns.type(rows))
-        builder.store(builder.gep(here, [further], source_etype=NUMBER), walker)
+        builder.store(builder.gep(here, [further], source_etype=DOUBLE), walker)
         return here
 
     def beside(self, address, columns):
         """Address of the entry ``columns`` further in the same row."""
-        return self.builder.gep(address, [self.columns.type(columns)], source_etype=NUMBER)
+        return self.builder.gep(address, [self.columns.type(columns)], source_etype=DOUBLE)
 
 
 def read(builder, address, width):

@@ -115,7 +115,7 @@ def arrived(task):
 
 
 @njit(**KERNEL)
-def settle(model, method, run, first, out, work):
+def settle_corner(model, method, run, first, out, work):
     """State ``(n,)`` after ``first`` and all jumps that it triggers at the same instant; returns the mode."""
     n, t = model.dimension, run.phase
     mode, fired = run.mode, first
@@ -146,8 +146,8 @@ def settle(model, method, run, first, out, work):
 @njit(**KERNEL)
 def order_matters(model, method, run, one, other, work):
     """Whether firing ``one`` or ``other`` first leads to different states or modes."""
-    mode_one = settle(model, method, run, one, work.error, work)
-    mode_other = settle(model, method, run, other, work.second_error, work)
+    mode_one = settle_corner(model, method, run, one, work.error, work)
+    mode_other = settle_corner(model, method, run, other, work.second_error, work)
     if mode_one != mode_other:
         return True
     for i in range(model.dimension):
@@ -158,7 +158,7 @@ def order_matters(model, method, run, one, other, work):
 
 
 @njit(**KERNEL)
-def turns_back(model, run, transition, before, work):
+def is_turned_back(model, run, transition, before, work):
     """Whether the flow only touches a guard that it has reached: soon it is back on the side ``before``.
 
     The sides have just been taken. At the bottom of a dip that is no deeper than rounding either end may be
@@ -185,7 +185,7 @@ def recall_sides(model, run):
 def has_only_touched(model, run, record, fired, side, work):
     """Whether the flow has only touched a guard, with the ``side`` beyond it; then a grazing is kept."""
     t = run.phase
-    if not turns_back(model, run, fired, -side, work):
+    if not is_turned_back(model, run, fired, -side, work):
         return False
     if not allowed(model, fired, t, run.y, work.scalar):
         return False

@@ -35,7 +35,7 @@ def remember_visit(model, run):
 
 
 @njit(**KERNEL)
-def time_before(model, run, back, further):
+def time_between(model, run, back, further):
     """Time from the jump ``further`` before the last one to the one ``back`` before it."""
     n = model.dimension
     later, earlier = run.visits[visit_before(run, back)], run.visits[visit_before(run, further)]

@@ -36,7 +36,7 @@ from hybrid.kernels.types.options import INLINE, exported
 from hybrid.kernels.types.task import task_of
 
 # A guard is clear of zero if it is so many times as far from it as rounding, and so is a speed.
-CLEAR = 2.0 * LEFT_BEHIND
+CLEAR_BY = 2.0 * LEFT_BEHIND
 # A speed tells the side if it keeps itself up to this share until the guard is out of its rounding.
 CHANGE = 0.1
 # A pivot below this share of the largest entry may be rounding.
@@ -216,12 +216,12 @@ def enters_plainly(model, run, fired, target, x, work):
             drift = speed_rounding(model, run, other, target, t, x, work)
             bend = acceleration(model, other, target, t, x, work)
             steady = abs(bend) * band <= CHANGE * speed * speed
-            if not (steady and -direction * speed > CLEAR * drift and abs(speed) < math.inf):
+            if not (steady and -direction * speed > CLEAR_BY * drift and abs(speed) < math.inf):
                 return False
             run.rehearsal[1, other] = BY_SPEED
             if other == fired:
                 run.speed_behind, run.acceleration_behind = speed, bend
-        elif not -direction * value > CLEAR * band:
+        elif not -direction * value > CLEAR_BY * band:
             return False
     return True
 

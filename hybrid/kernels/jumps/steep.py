@@ -11,12 +11,10 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.slopes import change_of_rate
 from hybrid.kernels.events.guards import displace, error_band, gradient_band, guard_speed
-from hybrid.kernels.events.resolution import speed_displaced
+from hybrid.kernels.events.resolution import FARTHER, speed_displaced
 from hybrid.kernels.types.codes import RUNGE_KUTTA
 from hybrid.kernels.types.options import KERNEL
 
-# Slopes are compared at the distance of rounding from the guard, and so many times farther.
-FARTHER = 16.0
 # A slope that is larger at the guard by this factor grows without limit.
 GROWS = 1.02
 # A guard comes to rest if its speed is lower by this factor than where the tolerances cease to know it.
@@ -37,7 +35,7 @@ def rates_beside(model, run, mode, t, distance, tangents, out, work):
 
 
 @njit(**KERNEL)
-def is_lost(model, method, run, mode, transition, side, tangents, work):
+def is_lost_at_slope(model, method, run, mode, transition, side, tangents, work):
     """Whether tangent vectors change by more than the tolerance over the rounding of a guard, on one side.
 
     Uses ``work.new`` and ``work.trial`` as scratch.
@@ -67,7 +65,7 @@ def is_lost(model, method, run, mode, transition, side, tangents, work):
 def is_steep(model, method, run, transition, tangents, work):
     """Whether steps have lost digits on the way to the guard of a transition that is about to fire."""
     side = -float(model.direction[transition])
-    return is_lost(model, method, run, run.mode, transition, side, tangents, work)
+    return is_lost_at_slope(model, method, run, run.mode, transition, side, tangents, work)
 
 
 @njit(**KERNEL)
@@ -76,7 +74,7 @@ def is_steep_behind(model, method, run, fired, tangents, work):
     mode = run.mode
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         other = model.outgoing[slot]
-        if model.surface[other] == model.surface[fired] and is_lost(
+        if model.surface[other] == model.surface[fired] and is_lost_at_slope(
             model, method, run, mode, other, -float(model.direction[other]), tangents, work
         ):
             return True

@@ -24,12 +24,12 @@ from hybrid.kernels.guards.isolate import first_change
 from hybrid.kernels.guards.pieces import NO_COLUMN, NOWHERE, Guard
 from hybrid.kernels.jumps.jump import assume_sizes, carry_tangents, go_onward, move
 from hybrid.kernels.jumps.locked import begin_instant
-from hybrid.kernels.jumps.past import fired_before, time_before
+from hybrid.kernels.jumps.past import fired_before, time_between
 from hybrid.kernels.jumps.record import remember_flight, remember_jump
 from hybrid.kernels.jumps.rest import ROUNDED
 from hybrid.kernels.limit.endless import hold_endless, mark_endless, may_be_held
 from hybrid.kernels.limit.impacts import extrapolate_impacts, series_of_impacts
-from hybrid.kernels.limit.meeting import is_close, may_be_mapped, meeting_matrix
+from hybrid.kernels.limit.meeting import is_close_to_limit, may_be_mapped, meeting_matrix
 from hybrid.kernels.limit.rounds import (
     FEWEST_JUMPS,
     NO_SERIES,
@@ -92,7 +92,7 @@ def known_limit(model, method, run, transition, work):
     landing, next_round = rounding_of_landing(model, run, time, work), series.ratio**2 * series.latest
     closer = misfit <= series.ratio ** (1.0 / turn) * misfit_before and landing < next_round
     hidden = 0.0 if closer else min(landing / (1.0 - series.ratio) ** 2, series.latest)
-    lasted = time_before(model, run, 0, min(series.jumps, run.visits.shape[0]) - 1)
+    lasted = time_between(model, run, 0, min(series.jumps, run.visits.shape[0]) - 1)
     if misfit > method.rtol * lasted + hidden:
         before[0] = math.inf
         return NO_SERIES
@@ -296,7 +296,7 @@ def go_to_limit(task, series, transition):
         return False
     named = model.accumulates_to[transition] != NO_MODE
     mapped = tangents > 0 and named and may_be_mapped(model, run, turn)
-    if mapped and left > 0.0 and not is_close(model, method, run, series, work):
+    if mapped and left > 0.0 and not is_close_to_limit(model, method, run, series, work):
         return False
     if not may_be_held(model, run, turn, left):
         return False

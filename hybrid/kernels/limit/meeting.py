@@ -146,7 +146,7 @@ def may_be_mapped(model, run, turn):
 
 
 @njit(**KERNEL)
-def is_close(model, method, run, series, work):
+def is_close_to_limit(model, method, run, series, work):
     """Whether the tolerances hide how far the next round moves a guard, or rounding begins to hide it.
 
     What the jumps to come do to tangent vectors besides the map of the meeting fades with the time left.

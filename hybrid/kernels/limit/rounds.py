@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from numba import njit
 
 from hybrid.kernels.events.guards import rounding_band, size_of_time
-from hybrid.kernels.jumps.past import fired_before, time_before, visit_before
+from hybrid.kernels.jumps.past import fired_before, time_between, visit_before
 from hybrid.kernels.types.codes import ENDLESS, LIMIT
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
@@ -26,7 +26,7 @@ STEADY = 0.1
 # it may be from the guards, and how far the resets may move it. An extrapolation errs by its square.
 RESOLVED = 1e-6
 # The share of a time by which rounding moves the time between two jumps.
-HIDDEN = 4.0 * EPSILON
+HIDDEN_IN_TIME = 4.0 * EPSILON
 
 
 class Series(NamedTuple):
@@ -52,8 +52,8 @@ NO_SERIES = Series(0, 0, 0.0, 0.0, 0.0, 0.0)
 @njit(**INLINE)
 def shortens(model, run, turn):
     """Whether the last ``turn`` jumps took less time than those before them, or rounding may hide it."""
-    before, hidden = time_before(model, run, turn, 2 * turn), HIDDEN * size_of_time(model, run.phase)
-    return time_before(model, run, 0, turn) - hidden < (1.0 - RESOLVED) * before
+    before, hidden = time_between(model, run, turn, 2 * turn), HIDDEN_IN_TIME * size_of_time(model, run.phase)
+    return time_between(model, run, 0, turn) - hidden < (1.0 - RESOLVED) * before
 
 
 @njit(**KERNEL)
@@ -62,11 +62,11 @@ def time_left_of_rounds(model, run, turn, back):
 
     Zero if the rounds do not shorten by a steady ratio.
     """
-    d0 = time_before(model, run, back, back + turn)
-    d1 = time_before(model, run, back + turn, back + 2 * turn)
+    d0 = time_between(model, run, back, back + turn)
+    d1 = time_between(model, run, back + turn, back + 2 * turn)
     if not 0.0 < d0 < d1:
         return 0.0, 1.0
-    d2 = time_before(model, run, back + 2 * turn, back + 3 * turn)
+    d2 = time_between(model, run, back + 2 * turn, back + 3 * turn)
     if not d1 < d2:
         return 0.0, 1.0
     ratio = d0 / d1
@@ -107,7 +107,7 @@ def series_of_rounds(model, run):
             continue
         earlier, _ = time_left_of_rounds(model, run, turn, turn)
         if earlier > 0.0:
-            latest = time_before(model, run, 0, turn)
+            latest = time_between(model, run, 0, turn)
             return Series(turn, jumps, ratio, latest, left, left + latest - earlier)
     return NO_SERIES
 

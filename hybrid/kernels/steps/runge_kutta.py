@@ -15,6 +15,7 @@ from hybrid.kernels.guards.first_event import first_event, keep_error
 from hybrid.kernels.guards.touch import note_touch, remember_touch, share_with_one_touch
 from hybrid.kernels.steps.runge_kutta_landing import NOT_THERE, land_on_first, reach_any, sign_at_end
 from hybrid.kernels.steps.step import (
+    FINEST,
     attempt,
     attempt_again,
     interpolant_path,
@@ -37,13 +38,11 @@ from hybrid.kernels.types.layout import EPSILON, Task
 from hybrid.kernels.types.options import INLINE, KERNEL, exported
 from hybrid.kernels.types.task import task_of
 
-SAFETY = 0.9
+SAFETY_FACTOR = 0.9
 SHRINK = 0.2
 GROW = 6.0
 # Share of a step that is tried next if its error hides on which side of a guard it ends.
-SHORTER = 0.5
-# Shortest step, in units of the rounding of time.
-FINEST = 4.0 * EPSILON
+TRY_SHORTER = 0.5
 # Steps start short after an event. A flight that is a polynomial has no error that limits its steps, and one
 # step across many short bounces would lose them in its rounding error.
 LONGEST_AFTER_EVENT = 100.0
@@ -186,7 +185,7 @@ def find_event(task, h, interpolated):
         theta, fired, proved, blurred = first_event(task, path, True, ignored, touched)
         if blurred != NO_TRANSITION:
             restore_sides(model, run)
-            if SHORTER * h > FINEST * measured_time(model, run, mode):
+            if TRY_SHORTER * h > FINEST * measured_time(model, run, mode):
                 return 0.0, 0.0, NO_TRANSITION
             correction, first = reach_any(task, h)
             if first != NO_TRANSITION:
@@ -241,7 +240,7 @@ def growth_factor(method, run, h, ratio):
     if run.last_step > 0.0:
         trend = h / run.last_step * (run.last_ratio / ratio) ** method.exponent
         factor = min(factor, factor * trend)
-    return min(GROW, max(SHRINK, SAFETY * factor))
+    return min(GROW, max(SHRINK, SAFETY_FACTOR * factor))
 
 
 @njit(**INLINE)
@@ -282,7 +281,7 @@ def reject(task, h, ratio):
     _, model, method, run, _, work = task_of(task)
     mode = run.mode
     run.rejected += 1
-    shrink = max(SHRINK, SAFETY * ratio ** (-method.exponent)) if ratio > 1.0 else 0.1
+    shrink = max(SHRINK, SAFETY_FACTOR * ratio ** (-method.exponent)) if ratio > 1.0 else 0.1
     run.next_step = h * shrink
     finest = h * shrink <= FINEST * measured_time(model, run, mode)
     if finest and ratio > 1.0 and model.timed[mode] == 0:
@@ -375,7 +374,7 @@ def runge_kutta_step(task, remaining):
         # Where the field ends at the guard, a landing may have no value: a shorter step comes nearer to it.
         if h == 0.0 if fired == NO_TRANSITION else is_lost(model, work):
             restore_sides(model, run)
-            return try_shorter(run, SHORTER * whole)
+            return try_shorter(run, TRY_SHORTER * whole)
     if interpolated and fired == NO_TRANSITION and not follows(task, h, whole):
         if guarded:
             restore_sides(model, run)

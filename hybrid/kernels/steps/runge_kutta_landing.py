@@ -19,7 +19,7 @@ from hybrid.kernels.types.task import task_of
 # Below this share of the step, one Euler step completes a correction: the error left is its square.
 EULER_IS_ENOUGH = 1e-8
 # Largest Newton step, as a share of the step, for a guard that may have kinks and jumps.
-FARTHEST = 1e-3
+MOST_CORRECTION = 1e-3
 # First distance, as a share of the step, at which the other side of a guard is searched.
 FIRST_REACH = 1e-10
 MOST_LANDINGS = 200
@@ -161,7 +161,7 @@ def land(task, transition, side, h, theta):
         # A place that does not come from Newton's method gives no rate of convergence.
         last = 0.0
         # A Newton step longer than the error of the interpolant follows another slope, that beside a jump.
-        trusted = smooth or abs(correction) <= FARTHEST * h
+        trusted = smooth or abs(correction) <= MOST_CORRECTION * h
         if low < newton < high and trusted and not slow:
             length, last = newton, abs(correction)
         elif closed:

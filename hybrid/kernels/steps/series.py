@@ -34,7 +34,7 @@ from hybrid.kernels.steps.series_length import (
     longest_step,
     within_floats,
 )
-from hybrid.kernels.steps.step import moves_nothing, rates_by_jacobian
+from hybrid.kernels.steps.step import FINEST, moves_nothing, rates_by_jacobian
 from hybrid.kernels.types.codes import (
     DESINGULARISED,
     EXACT,
@@ -57,12 +57,10 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 from hybrid.kernels.types.task import task_of
 
 # Share of a step that is tried next if the end of the series hides on which side of a guard the step ends.
-SHORTER = 0.75
+BLURRED_SHORTER = 0.75
 MOST_SHORTER = 100
-# Shortest step, in units of the rounding of time.
-FINEST = 4.0 * EPSILON
 # A root that a step of its own clock does not bring to zero is no farther from it than this share of time.
-AT_ROOT = 64.0 * EPSILON
+ROUNDING_OF_STAY = 64.0 * EPSILON
 # Largest correction of a landing, as a share of the step.
 CLOSE = 1e-8
 # A flight without end is followed for this many times the time in which the state changes by its size.
@@ -290,9 +288,9 @@ def up_to_event(task, path):
     mode, finest = run.mode, FINEST * measured_time(model, run, run.mode)
     theta, fired, proved, blurred = first_event(task, path, False, NO_TRANSITION, 0.0)
     for _ in range(MOST_SHORTER):
-        if blurred == NO_TRANSITION or SHORTER * path.length <= finest:
+        if blurred == NO_TRANSITION or BLURRED_SHORTER * path.length <= finest:
             break
-        path = up_to(path, SHORTER * path.length)
+        path = up_to(path, BLURRED_SHORTER * path.length)
         evaluate_end(model, mode, path)
         restore_sides(model, run)
         theta, fired, proved, blurred = first_event(task, path, False, NO_TRANSITION, 0.0)
@@ -326,7 +324,7 @@ def time_taken(path, remaining, finest, ends):
 
 
 @njit(**KERNEL)
-def land(model, run, tangents, fired, t, stay, span, work):
+def land_series(model, run, tangents, fired, t, stay, span, work):
     """Bring the state at the end of a step onto the guard that ends it; returns the time that this takes.
 
     The step ends at the time ``t`` of a ``stay`` in the mode, and has taken the time ``span``.
@@ -351,7 +349,7 @@ def end_at_root(model, run, path, work):
     exponentially. The guard is reached when the root at its pace needs less than the rounding of time.
     """
     mode, series, pace = run.mode, path.powers, path.powers[1, path.clock]
-    first, near = model.first_outgoing[mode], AT_ROOT * measured_time(model, run, mode)
+    first, near = model.first_outgoing[mode], ROUNDING_OF_STAY * measured_time(model, run, mode)
     for slot in range(first, model.first_outgoing[mode + 1]):
         run.rehearsal[3, model.outgoing[slot]] = 0
     for slot in range(first, model.first_outgoing[mode + 1]):
@@ -405,7 +403,7 @@ def series_step(task, remaining):
         sides_at(model, run, path.start + span, work)
     if fired != NO_TRANSITION:
         stay = run.since_entry + span
-        span += land(model, run, tangents, fired, path.start + span, stay, span, work)
+        span += land_series(model, run, tangents, fired, path.start + span, stay, span, work)
     return GO_ON, span
 
 

@@ -24,14 +24,14 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 # Series that can be trusted to the last digit are cut off below rounding.
 EXACT_TOLERANCE = 1e-17
 # Share of the largest component that serves as absolute tolerance for the others.
-SHARE = 1e-3
+SHARE_OF_LARGEST = 1e-3
 # A step is shorter by so many bits, shared by its orders: the safety factor of Jorba and Zou.
-SAFETY = 0.7 / math.log(2.0)
+SAFETY_BITS = 0.7 / math.log(2.0)
 # Share of the tolerance for tangent vectors: a stiff contact stretches a vector a thousandfold and shrinks it
 # again, and the error made while the vector is long remains when it is short.
 TANGENT_SHARE = 0.1
 # Below this tolerance the error of tangent vectors is rounding.
-FINEST = 1e-14
+FINEST_OF_TANGENTS = 1e-14
 # Absolute tolerance of exact series, which need none.
 TINY = 1e-300
 # Number of terms at the end of a series that must be small.
@@ -101,7 +101,7 @@ def weigh_state(series, n, controlled, tolerance, weights):
         largest = max(largest, abs(series[0, i]))
     if exact and largest == 0.0:
         largest = size_from_origin(series, controlled)
-    floor = SHARE * rtol * largest + TINY if exact else atol + TINY
+    floor = SHARE_OF_LARGEST * rtol * largest + TINY if exact else atol + TINY
     for i in range(0, n, NARROW):
         store(weights, 0, i, 1.0 / (floor + rtol * magnitude(load(series, 0, i))))
     for i in range(n, whole_registers(n, NARROW)):
@@ -116,8 +116,8 @@ def weigh_tangents(series, n, controlled, first, tolerance, weights):
         component = load(series, 0, first + NARROW * i)
         square = component * component + square
     if not exact:
-        rtol = min(rtol, max(TANGENT_SHARE * rtol, FINEST))
-    floor = (SHARE * rtol if exact else rtol) * square_root(square / controlled) + TINY
+        rtol = min(rtol, max(TANGENT_SHARE * rtol, FINEST_OF_TANGENTS))
+    floor = (SHARE_OF_LARGEST * rtol if exact else rtol) * square_root(square / controlled) + TINY
     for i in range(n):
         component = load(series, 0, first + NARROW * i)
         store(weights, 0, first + NARROW * i, 1.0 / (floor + rtol * magnitude(component)))
@@ -188,7 +188,7 @@ def longest_step(series, columns, order, tolerance, weights):
         older = logarithms_of_terms(series, columns, o, tail, weights)
         last = max(last, largest(shares_of_orders(older, o, order, fall)))
     growth = largest(newer) - largest(older)
-    return power_of_two(-last - (0.0 if exact else SAFETY / (order - 1))), last, growth
+    return power_of_two(-last - (0.0 if exact else SAFETY_BITS / (order - 1))), last, growth
 
 
 @njit(**KERNEL)

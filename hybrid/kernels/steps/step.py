@@ -13,8 +13,10 @@ from hybrid.kernels.types.task import task_of
 
 # At the start of a run, a state below this many tolerances counts as this large.
 MANY_TOLERANCES = 1e4
+# Shortest step, in units of the rounding of time.
+FINEST = 4.0 * EPSILON
 # Unit of time of a state at rest, as a share of the run or of the forcing period.
-AT_REST = 1e-4
+SHARE_AT_REST = 1e-4
 
 
 @njit(**INLINE)
@@ -179,7 +181,7 @@ def starting_step(model, method, mode, t, y, tangents, remaining, work):
     size, speed = math.sqrt(size / count), math.sqrt(speed / count)
     horizon = min(model.period, remaining) if model.period > 0.0 else remaining
     unit = max(size, MANY_TOLERANCES) / speed if speed > 0.0 else math.inf
-    unit = min(unit, (1.0 if speed > 0.0 else AT_REST) * horizon)
+    unit = min(unit, (1.0 if speed > 0.0 else SHARE_AT_REST) * horizon)
     h = min(0.01 * unit, method.max_step)
     for i in range(length):
         work.trial[i] = y[i] + h * work.stages[0, i]

@@ -8,9 +8,9 @@ from hybrid.kernels.types.structure import Structure
 # time since the entry, the longest step; the time until the next step must end; the time that the last stay
 # took, and its share by which a step may exceed that; the steps taken, the integral of div f, whether the
 # roots are those of a step, the period, whether a step may lead beyond its room.
-T, LOW, CYCLE, SINCE, LONGEST_STEP, ROOM, STAY, AHEAD_OF_STAY, STEPS, DIVERGENCE = range(10)
+T, PHASE_LOW, CYCLE, SINCE, LONGEST_STEP, ROOM, STAY, AHEAD_OF_STAY, STEPS, DIVERGENCE = range(10)
 FOLLOWS, PERIOD, LEADS_ON = range(10, 13)
-NUMBERS = 13
+LANE_NUMBERS = 13
 # Those of each guard: its side, whether it is zero at the start of the step, the root that the last one left,
 # and how far errors may have moved it at the end of the step.
 PER_GUARD = 4

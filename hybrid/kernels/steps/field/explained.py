@@ -16,7 +16,12 @@ from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.events.guards import has_program, has_terms_in_state
 from hybrid.kernels.events.path import up_to
 from hybrid.kernels.steps.field.pulses import Asked, first_hidden
-from hybrid.kernels.steps.field.residual import MARGIN, MARGIN_OF_INTERPOLANT, follows_field, is_finite
+from hybrid.kernels.steps.field.residual import (
+    MARGIN_OF_FIELD,
+    MARGIN_OF_INTERPOLANT,
+    follows_field,
+    has_finite_terms,
+)
 from hybrid.kernels.steps.step import interpolant_path, path_of_step
 from hybrid.kernels.types.codes import ARGUMENTS, HIGH, IN_TIME, LOW, TERMS
 from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH
@@ -27,7 +32,7 @@ from hybrid.kernels.types.options import KERNEL, exported
 # are reported.
 COARSE = 10.0
 # Shortest step, in units of the rounding of time: the places at which a method looks are apart.
-FINEST = 64.0 * EPSILON
+FINEST_PIECE = 64.0 * EPSILON
 # After this many such steps the forcing is no longer tested: a run does not crawl where bounds say nothing.
 MOST_UNRESOLVED = 100
 # Most attempts to shorten a step; one that halves the step reaches its rounding sooner.
@@ -68,7 +73,7 @@ def _longest_explained(model, method, run, path, nodes, kind, work):
     """
     h, mode = path.length, run.mode
     rounding = 0.0 if path.clock >= 0 else measured_time(model, run, mode) / path.pace
-    shortest = FINEST * rounding + EPSILON * h
+    shortest = FINEST_PIECE * rounding + EPSILON * h
     for _ in range(MOST_CUTS):
         finest = 2.0 * EPSILON * (rounding + h)
         explained, beyond, coarse = h, h, False
@@ -145,9 +150,9 @@ def follows_attempt(model, method, run, h, work):
 def explained_series(model, method, run, tangents, path, work):
     """The length of the step on which a path of series follows the forcing; nan if it is not finite."""
     h, nodes = path.length, method.series_nodes
-    if not is_finite(model, run.mode, tangents, path, work):
+    if not has_finite_terms(model, run.mode, tangents, path, work):
         return math.nan
-    shortest = EPSILON * h + (0.0 if path.clock >= 0 else FINEST * measured_time(model, run, run.mode))
+    shortest = EPSILON * h + (0.0 if path.clock >= 0 else FINEST_PIECE * measured_time(model, run, run.mode))
     for _ in range(MOST_CUTS):
         h = timed = _longest_explained(model, method, run, up_to(path, h), nodes, IN_TIME, work)
         if _arguments_change(model, run.mode, up_to(path, h), work):
@@ -155,7 +160,7 @@ def explained_series(model, method, run, tangents, path, work):
         if shortest < h < timed:
             # On a shorter step, the forcing in time has other places to be explained by.
             continue
-        if follows_field(model, method, run, tangents, up_to(path, h), MARGIN, work):
+        if follows_field(model, method, run, tangents, up_to(path, h), MARGIN_OF_FIELD, work):
             return h
         h *= 0.5
         if not h > shortest:

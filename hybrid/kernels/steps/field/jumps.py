@@ -17,7 +17,7 @@ from hybrid.kernels.types.options import KERNEL, exported
 # A jump changes a rate by more than this share of it; one of less changes tangent vectors by no more.
 LEAST = 1e-6
 # A jump times the step is less than so many tolerances: methods see a jump by a thousandth of it, or more.
-HIDDEN = 1e3
+MOST_TOLERANCES = 1e3
 # The step is halved so many times towards the largest change. At a jump most of the change is still there,
 # and at some time it is so many times what the derivatives at both ends explain.
 HALVINGS = 10
@@ -25,7 +25,7 @@ UNEXPLAINED = 30.0
 
 
 @njit(**KERNEL)
-def leave(model, run, work):
+def note_start(model, run, work):
     """Keep the state before a step in ``work.departure (n,)``."""
     for i in range(model.dimension):
         work.departure[i] = run.y[i]
@@ -55,7 +55,7 @@ def _jumps_between(model, method, run, t, span, work):
         before, after = work.field[i], work.field_after[i]
         tolerance = method.atol + method.rtol * max(abs(run.y[i]), abs(work.departure[i]))
         some = abs(after - before) > LEAST * (abs(before) + abs(after))
-        hidden = abs(after - before) * span < HIDDEN * tolerance
+        hidden = abs(after - before) * span < MOST_TOLERANCES * tolerance
         if some and hidden and _rate_jumps(model, run, t, i, before, after, work):
             return True
     return False

@@ -25,16 +25,16 @@ from hybrid.kernels.types.kinds import REAL, TRUTH, VECTOR
 from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Verdicts on a piece of a step.
-EXPLAINED, UNKNOWN, HIDDEN = range(3)
+EXPLAINED, UNDECIDED, HIDDEN = range(3)
 # The expression may leave the range of two samples by this share of what all samples differ by: a maximum
 # that error control sees lies a little above them.
 BETWEEN = 0.25
 # The roundings of an expression at two places of a step differ by no more than this factor.
 ROUNDINGS = 4.0
 # Share of the tolerance that may remain unseen on a piece: a few pieces of a step hold a jump.
-SHARE = 0.01
+SHARE_OF_TOLERANCE = 0.01
 # Most pieces between two samples: a place is found to rounding in some 50, one pulse among others in more.
-MOST_PIECES = 80
+MOST_PIECES_OF_FORCING = 80
 
 
 class Asked(NamedTuple):
@@ -63,7 +63,7 @@ def _is_steady(model, program, path, tolerance, work):
     programs, half = model.programs, 0.5 * path.length
     first, last = programs.first[program], model.bound(programs, program, path, half, half, work.registers)
     row = work.registers[last]
-    if (row[HIGH] - row[LOW]) * path.length <= SHARE * tolerance:
+    if (row[HIGH] - row[LOW]) * path.length <= SHARE_OF_TOLERANCE * tolerance:
         return True
     for place in range(last + 1):
         if programs.checked[first + place] == 1 and not _is_monotone(work.registers[place]):
@@ -122,7 +122,7 @@ def _judged(programs, program, j, whole, length, tolerance, work):
         low, high, noise = _explained_range(row, place, j, work)
         if place == last:
             unseen = max(low - row[LOW], row[HIGH] - high, 0.0)
-            if unseen * length <= SHARE * tolerance:
+            if unseen * length <= SHARE_OF_TOLERANCE * tolerance:
                 return EXPLAINED, 0.0
         elif not row[HIGH] - row[LOW] < math.inf:
             # This part may be unused, such as the other branch of a choice.
@@ -132,7 +132,7 @@ def _judged(programs, program, j, whole, length, tolerance, work):
         if row[LOW] < low - noise or row[HIGH] > high + noise:
             if row[HIGH_MIDDLE] < low - noise or row[LOW_MIDDLE] > high + noise:
                 return HIDDEN, unseen
-            verdict = UNKNOWN
+            verdict = UNDECIDED
     return verdict, unseen
 
 
@@ -148,8 +148,8 @@ def _hidden_between(model, program, path, j, asked, work):
         last = model.bound(model.programs, program, path, middle, radius, work.registers)
         verdict, unseen = _judged(model.programs, program, j, pieces == 0, high - low, tolerance, work)
         pieces += 1
-        if verdict == UNKNOWN and high - low > asked.finest:
-            if pieces < MOST_PIECES and top < stack.shape[0] - 1:
+        if verdict == UNDECIDED and high - low > asked.finest:
+            if pieces < MOST_PIECES_OF_FORCING and top < stack.shape[0] - 1:
                 stack[top, 0], stack[top + 1, 0], stack[top + 1, 1] = middle, low, middle
                 top += 1
                 continue

@@ -17,12 +17,12 @@ from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
 # Tolerances by which the integrals of both may differ over a step: what a series leaves out is one of them.
-MARGIN = 2.0
+MARGIN_OF_FIELD = 2.0
 # The same for an interpolant. Its order is that of the error estimate: up to a hundred tolerances are what it
 # leaves out of a smooth field.
 MARGIN_OF_INTERPOLANT = 1e3
 # Rounding of a state, in shares of it, by which the noise of its field is measured.
-ROUNDING = 8.0 * EPSILON
+SHAKEN = 8.0 * EPSILON
 
 
 @njit(**INLINE)
@@ -50,7 +50,7 @@ def _along_series(model, mode, tangents, path, s, work):
 
 
 @njit(**KERNEL)
-def is_finite(model, mode, tangents, path, work):
+def has_finite_terms(model, mode, tangents, path, work):
     """Whether a series has values at its end, of the state and of the tangent vectors: no term overflows."""
     _along_series(model, mode, tangents, path, path.length, work)
     total = 0.0
@@ -77,7 +77,7 @@ def _add_residual(model, run, tangents, path, s, weight, noisy, work):
     rates_by_jacobian(model, mode, t, work.trial, tangents, work.jacobian, field)
     if noisy:
         for i in range(length):
-            work.trial[i] *= 1.0 + (ROUNDING if (i + 1) // 2 % 2 == 0 else -ROUNDING)
+            work.trial[i] *= 1.0 + (SHAKEN if (i + 1) // 2 % 2 == 0 else -SHAKEN)
         rates_by_jacobian(model, mode, t, work.trial, tangents, work.jacobian, other)
     for i in range(length):
         noise = abs(pace * (other[i] - field[i])) if noisy else 0.0
@@ -98,7 +98,7 @@ def _is_small(model, method, run, tangents, margin, work):
             floor = method.rtol * math.sqrt(square / controlled) + 1e-300
         for i in range(first, first + n):
             size = max(abs(run.y[i]), abs(work.trial[i]))
-            if not work.error[i] <= margin * (floor + (method.rtol + ROUNDING) * size):
+            if not work.error[i] <= margin * (floor + (method.rtol + SHAKEN) * size):
                 return False
     return True
 
@@ -124,6 +124,6 @@ def follows_field(model, method, run, tangents, path, margin, work):
 def followed(model, method, run, tangents, path, work):
     """The length of a path, halved until its series has the field as its derivative; zero if it never has."""
     h = path.length
-    while h > 0.0 and not follows_field(model, method, run, tangents, up_to(path, h), MARGIN, work):
+    while h > 0.0 and not follows_field(model, method, run, tangents, up_to(path, h), MARGIN_OF_FIELD, work):
         h *= 0.5
     return h

@@ -21,7 +21,7 @@ START, STOP, STEP = 0, 1, 2
 HERE, LAST, BY = 0, 1, 2
 WORD = llvm.IntType(64)
 # Bytes of a number.
-NUMBER = 8
+BYTES_OF_NUMBER = 8
 NUMBERS = (types.float64, types.int64)
 RANGE, RANGE_ITERATOR = types.range_state64_type, types.range_iter64_type
 
@@ -32,7 +32,7 @@ def array_of(context, builder, kind, data, shape):
     ``data`` is the address of its first number, ``shape`` the number of entries along each axis.
     """
     value = builder.insert_value(_without_owner(context.get_value_type(kind), kind.ndim), data, DATA)
-    items, stride = shape[0], WORD(NUMBER)
+    items, stride = shape[0], WORD(BYTES_OF_NUMBER)
     for axis in reversed(range(kind.ndim)):
         value = builder.insert_value(value, shape[axis], (SHAPE, axis))
         if axis < kind.ndim - 1:
@@ -48,8 +48,8 @@ def _without_owner(form, ndim):
     parts = [llvm.Constant(each, llvm.Undefined) for each in form.elements]
     for place in OWNERS:
         parts[place] = llvm.Constant(form.elements[place], None)
-    parts[ITEM_SIZE] = WORD(NUMBER)
-    strides = [llvm.Constant(WORD, llvm.Undefined)] * (ndim - 1) + [WORD(NUMBER)]
+    parts[ITEM_SIZE] = WORD(BYTES_OF_NUMBER)
+    strides = [llvm.Constant(WORD, llvm.Undefined)] * (ndim - 1) + [WORD(BYTES_OF_NUMBER)]
     parts[STRIDES] = llvm.Constant(form.elements[STRIDES], strides)
     return llvm.Constant(form, parts)
 
