@@ -150,8 +150,8 @@ def take_clear_sides(model, run):
     """Take the sides of a mode that a plain jump has entered (``jumps.plain``)."""
     for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
         other = model.outgoing[slot]
-        run.side[other], run.on_guard[other] = run.rehearsal[0, other], run.rehearsal[1, other]
-        run.due[other], run.rehearsal[3, other] = 0, 0
+        run.side[other], run.on_guard[other] = run.tried_side[other], run.tried_order[other]
+        run.due[other], run.event_side[other] = 0, 0
     run.clear = 0
 
 
@@ -425,10 +425,10 @@ def reaches_one_guard(model, run):
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         other = model.outgoing[slot]
         # A guard that was zero at the start of the step may not have left zero by more than rounding.
-        if other != fired and (model.surface[other] == model.surface[fired] or run.rehearsal[1, other] > 0):
+        if other != fired and (model.surface[other] == model.surface[fired] or run.order_before[other] > 0):
             return False
     run.side[fired] = -run.side[fired]
-    run.on_guard[fired], run.due[fired], run.rehearsal[3, fired] = BY_SPEED, 1, 0
+    run.on_guard[fired], run.due[fired], run.event_side[fired] = BY_SPEED, 1, 0
     return True
 
 

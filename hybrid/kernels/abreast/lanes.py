@@ -136,5 +136,5 @@ def clear_guards(model, run, steps):
     for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
         transition = model.outgoing[slot]
         # Only the first step may have begun on a guard.
-        run.rehearsal[1, transition] = run.on_guard[transition] if steps == 1 else 0
-        run.on_guard[transition], run.rehearsal[3, transition], run.passed[transition] = 0, 0, NO_ROOT
+        run.order_before[transition] = run.on_guard[transition] if steps == 1 else 0
+        run.on_guard[transition], run.event_side[transition], run.passed[transition] = 0, 0, NO_ROOT

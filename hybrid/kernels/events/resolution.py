@@ -8,7 +8,7 @@ from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION
 from hybrid.kernels.types.options import INLINE, KERNEL
 
-# The side of a guard before an event, in ``run.rehearsal``, if the step before has not told it.
+# The side of a guard before an event, in ``run.event_side``, if the step before has not told it.
 NOT_KNOWN = 2
 # The last terms of a series for a guard below this size may have lost their digits.
 UNDERFLOW = 1e-250
@@ -21,10 +21,10 @@ PROPORTIONAL = 0.5
 @njit(**INLINE)
 def keep_side(run, transition):
     """Remember what is known of a guard at the start of a step."""
-    run.rehearsal[0, transition] = run.side[transition]
-    run.rehearsal[1, transition] = run.on_guard[transition]
-    run.rehearsal[2, transition] = run.unproved[transition]
-    run.rehearsal[3, transition], run.passed[transition] = 0, NO_ROOT
+    run.side_before[transition] = run.side[transition]
+    run.order_before[transition] = run.on_guard[transition]
+    run.unproved_before[transition] = run.unproved[transition]
+    run.event_side[transition], run.passed[transition] = 0, NO_ROOT
 
 
 @njit(**INLINE)
@@ -35,20 +35,20 @@ def keep_change(run, transition, side):
     from the start of the step if the event is closer to the change of sides than to the end of the step.
     """
     run.side[transition] = side
-    before = run.rehearsal[0, transition]
+    before = run.side_before[transition]
     if side != before and before != 0 and run.passed[transition] < NO_ROOT:
-        run.rehearsal[3, transition] = side
+        run.event_side[transition] = side
         run.passed[transition] = 0.5 * (run.passed[transition] + 1.0)
         return
     run.passed[transition] = NO_ROOT
     if side != before:
-        run.rehearsal[3, transition] = before if before != 0 else NOT_KNOWN
+        run.event_side[transition] = before if before != 0 else NOT_KNOWN
 
 
 @njit(**INLINE)
 def keep_crossing(run, transition, theta, side):
     """Note a crossing at the share ``theta`` of the step, to ``side``."""
-    run.rehearsal[3, transition] = -side
+    run.event_side[transition] = -side
     if run.passed[transition] < NO_ROOT:
         run.passed[transition] = 0.5 * (run.passed[transition] + theta)
 
@@ -73,7 +73,7 @@ def set_sides_before(model, run, earliest):
     for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
         transition = model.outgoing[slot]
         if earliest < run.passed[transition] < NO_ROOT:
-            run.rehearsal[3, transition] = -run.rehearsal[3, transition]
+            run.event_side[transition] = -run.event_side[transition]
 
 
 @njit(**KERNEL)
@@ -81,10 +81,10 @@ def restore_sides(model, run):
     """Return to what was known of the guards at the start of the step."""
     for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
         transition = model.outgoing[slot]
-        run.side[transition] = run.rehearsal[0, transition]
-        run.on_guard[transition] = run.rehearsal[1, transition]
-        run.unproved[transition] = run.rehearsal[2, transition]
-        run.rehearsal[3, transition] = 0
+        run.side[transition] = run.side_before[transition]
+        run.on_guard[transition] = run.order_before[transition]
+        run.unproved[transition] = run.unproved_before[transition]
+        run.event_side[transition] = 0
 
 
 @njit(**KERNEL)

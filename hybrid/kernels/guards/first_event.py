@@ -371,7 +371,7 @@ def crossing_by_leading(model, run, guard, path, attempted, work):
     last = powers[order + 1, column] if end == 1.0 else work.stack[row, 2 + degree]
     certain = min(work.stack[row, 2] * side, -last * side) > guard.band + rest
     resolved = seen or is_resolved(model, run, transition, column, path, attempted, guard.on_guard, work)
-    run.rehearsal[3, transition] = side
+    run.event_side[transition] = side
     run.crossings += 1 if certain and resolved else UNCERTAIN
     return CROSSES, root_between(path, column, guard.known, bracket, side) / h, resolved
 
@@ -388,8 +388,8 @@ def crossing_by_pieces(task, transition, column, path, attempted):
         else:
             end = path.powers[order + 1, column]
     theta, share = attempts.crossing_on_path(model, method, run, transition, column, path, end, work)
-    side = run.rehearsal[3, transition]
-    run.rehearsal[3, transition] = 0
+    side = run.event_side[transition]
+    run.event_side[transition] = 0
     if column == NO_COLUMN:
         small = underflows(model, transition, path.start, run.y, later, work.trial, work.scalar)
     else:
@@ -453,7 +453,7 @@ def first_event(task, path, attempted, ignored, touched):
     guard changes sides, or grazes, on the step, although ``is_resolved`` is false for it, or none. The sides
     of guards without a crossing are brought up to date, to the end of the step, and guards that were left are
     no longer held to be zero at its start; ``resolution.restore_sides`` takes that back. For a guard with a
-    crossing, ``run.rehearsal[3]`` holds its side before that.
+    crossing, ``run.event_side`` holds its side before that.
     """
     _, model, _, run, _, work = task_of(task)
     mode, powers, order = run.mode, path.powers, path.degree

@@ -262,12 +262,12 @@ def crossing_on_path(model, method, run, transition, column, path, end, work):
     ``column`` is that of the guard on the path, or ``NO_COLUMN``. ``end`` is the value of a guard at the end
     of the step, which the path may hold with other rounding. A guard that leaves by its speed needs none.
     Returns the share of the step at which the guard crosses, and the share that is proved; the side after the
-    crossing, or at the end, goes to ``run.rehearsal[3, transition]``. The guard is no longer held to be zero
+    crossing, or at the end, goes to ``run.event_side[transition]``. The guard is no longer held to be zero
     at the start of the step, unless it rests there.
     """
     guard, length = guard_at_start(run, transition, column, path), path.length
     hidden, rests = _hidden_at_start(model, method, run, path, guard, end, work)
-    run.rehearsal[3, transition] = guard.side
+    run.event_side[transition] = guard.side
     if rests:
         # Or it leaves zero on a later step.
         return NO_ROOT, 1.0
@@ -276,11 +276,11 @@ def crossing_on_path(model, method, run, transition, column, path, end, work):
         after = 1 if end > 0.0 else (-1 if end < 0.0 else guard.side)
         crosses = crosses_towards(model.direction[transition], after) and guard.side * after < 0
         again = has_just_fired(run, transition, guard.on_guard)
-        run.rehearsal[3, transition] = after
+        run.event_side[transition] = after
         return (0.0 if crosses and not again else NO_ROOT), 1.0
     if column != NO_COLUMN or has_program(model, transition):
         place, side, proved = first_change(model, method, run, path, guard, hidden, work)
     else:
         place, side, proved = sampled_change(model, run, path, guard, hidden, work)
-    run.rehearsal[3, transition] = side
+    run.event_side[transition] = side
     return (NO_ROOT if place == NOWHERE else place / length), proved / length

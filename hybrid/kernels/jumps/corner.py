@@ -97,7 +97,7 @@ def arrived(task):
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         before = run.side[transition]
-        run.rehearsal[3, transition] = 0
+        run.event_side[transition] = 0
         if found != NO_TRANSITION or before == 0 or run.on_guard[transition] != 0:
             continue
         if underflows(model, transition, t, run.y, t, run.y, work.scalar):
@@ -119,7 +119,7 @@ def settle_corner(model, method, run, first, out, work):
     """State ``(n,)`` after ``first`` and all jumps that it triggers at the same instant; returns the mode."""
     n, t = model.dimension, run.phase
     mode, fired = run.mode, first
-    tried = Sides(run.rehearsal[0], run.rehearsal[1], run.rehearsal[2])
+    tried = Sides(run.tried_side, run.tried_due, run.tried_order)
     for i in range(run.side.shape[0]):
         tried.side[i], tried.due[i], tried.zero[i] = run.side[i], run.due[i], run.on_guard[i]
     for i in range(n):
@@ -176,9 +176,9 @@ def recall_sides(model, run):
     """Give guards that cross here or later on the step the sides that they had before it."""
     for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
         other = model.outgoing[slot]
-        if run.rehearsal[3, other] != 0:
-            run.side[other] = run.rehearsal[3, other] if run.rehearsal[3, other] != NOT_KNOWN else 0
-            run.rehearsal[3, other] = 0
+        if run.event_side[other] != 0:
+            run.side[other] = run.event_side[other] if run.event_side[other] != NOT_KNOWN else 0
+            run.event_side[other] = 0
 
 
 @njit(**KERNEL)

@@ -195,7 +195,7 @@ def carry_sizes(model, run, work):
 def enters_plainly(model, run, fired, target, x, work):
     """Whether the state ``x (n,)`` is clear of all guards of a mode but of the surface just crossed.
 
-    That guard leaves zero by its speed, to its near side. The sides go to ``run.rehearsal``.
+    That guard leaves zero by its speed, to its near side. The sides go to ``run.tried_side``.
     """
     t, n = run.phase, model.dimension
     run.speed_behind = run.acceleration_behind = 0.0
@@ -205,7 +205,7 @@ def enters_plainly(model, run, fired, target, x, work):
         value = guard_value(model, other, t, x, work.scalar)
         model.guard_gradient(other, t, x, model.parameters, work.gradient)
         band = rounding_band(model, run, other, t, x, work)
-        run.rehearsal[0, other], run.rehearsal[1, other] = -direction, 0
+        run.tried_side[other], run.tried_order[other] = -direction, 0
         if direction == 0:
             return False
         if model.surface[other] == model.surface[fired] and abs(value) <= band:
@@ -218,7 +218,7 @@ def enters_plainly(model, run, fired, target, x, work):
             steady = abs(bend) * band <= CHANGE * speed * speed
             if not (steady and -direction * speed > CLEAR_BY * drift and abs(speed) < math.inf):
                 return False
-            run.rehearsal[1, other] = BY_SPEED
+            run.tried_order[other] = BY_SPEED
             if other == fired:
                 run.speed_behind, run.acceleration_behind = speed, bend
         elif not -direction * value > CLEAR_BY * band:

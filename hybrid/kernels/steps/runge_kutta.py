@@ -200,7 +200,7 @@ def find_event(task, h, interpolated):
             return proved * h, 0.0, NO_TRANSITION
         if fired == NO_TRANSITION:
             break
-        side = run.rehearsal[3, fired]
+        side = run.event_side[fired]
         shortened, correction, first = land_on_first(task, fired, h, theta)
         if shortened != NOT_THERE:
             return shortened, correction, first

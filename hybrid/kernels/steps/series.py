@@ -351,14 +351,14 @@ def end_at_root(model, run, path, work):
     mode, series, pace = run.mode, path.powers, path.powers[1, path.clock]
     first, near = model.first_outgoing[mode], ROUNDING_OF_STAY * measured_time(model, run, mode)
     for slot in range(first, model.first_outgoing[mode + 1]):
-        run.rehearsal[3, model.outgoing[slot]] = 0
+        run.event_side[model.outgoing[slot]] = 0
     for slot in range(first, model.first_outgoing[mode + 1]):
         transition, column = model.outgoing[slot], model.dimension + slot - first
         value, slope, side = series[0, column], series[1, column], run.side[transition]
         ends = model.guard_in_series[transition] == 1 and crosses_towards(model.direction[transition], -side)
         if ends and value * slope < 0.0 and pace * abs(value) <= near * abs(slope):
             project_on_guard(model, run, transition, run.phase, work)
-            run.rehearsal[3, transition], run.pending = side, transition
+            run.event_side[transition], run.pending = side, transition
             return GO_ON, 0.0
     return STEP_TOO_SMALL, 0.0
 

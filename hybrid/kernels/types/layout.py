@@ -228,8 +228,9 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     - ``due (transitions,)``: 1 if the guard has been crossed at this instant and has not fired yet.
     - ``recent``: the last to fire; jump ``j`` is at ``j`` modulo the length. ``fires``: how often each has.
       ``visits (64, n + 2)``: the states right after those jumps, with their phases and cycles.
-    - ``rehearsal (4, transitions)``: scratch for jumps that are only tried; in the last row, the sides of
-      guards before the crossings found on the last step.
+    - ``side_before, order_before, unproved_before (transitions,)``: ``side, on_guard, unproved`` at the start
+      of the last step, and ``event_side`` the side of each guard before the crossing found on it.
+      ``tried_side, tried_due, tried_order``: the same as ``side, due, on_guard`` behind a jump that is tried.
     - ``passed (transitions,)``: the share of the last step at which each guard changed sides without firing
       before its crossing, then the middle between the two; ``NO_ROOT`` if it did not. ``unproved
       (transitions,)``: on how many steps the crossings of each guard are not proved.
@@ -239,7 +240,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
       The mode was entered in the period ``entry_cycle`` at ``entry_phase``, and ``entry_low`` of rounding.
       ``turned``: jumps at ticks that changed which transition of their clock may fire, last to ``turned_to``.
     - ``clear``: 1 if the last jump has left the state clear of all guards but its own, whose sides are in
-      ``rehearsal``; after an impact ``speed_behind`` and ``acceleration_behind`` are then those of its guard,
+      ``tried_side``; after an impact, ``speed_behind`` and ``acceleration_behind`` are those of its guard,
       or 0 if the reset has left the guard. ``distant``: 1 if the last step has proved that all guards are far
       from zero at its end; ``crossings``: 1 if it has found one crossing, which is certain.
     - ``horizon``: how long the run takes, 0 if that is not known at its start; ``longest_step`` in time so
@@ -266,7 +267,13 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     due: INDICES
     recent: INDICES
     fires: INDICES
-    rehearsal: INDEX_MATRIX
+    side_before: INDICES
+    order_before: INDICES
+    unproved_before: INDICES
+    event_side: INDICES
+    tried_side: INDICES
+    tried_due: INDICES
+    tried_order: INDICES
     passed: VECTOR
     unproved: INDICES
     visits: MATRIX
