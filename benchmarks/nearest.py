@@ -110,7 +110,7 @@ NEAREST = {
         "kernels/events/test_crossings.py",
     ),
     "hybrid/kernels/guards/hidden.py": ("kernels/events/test_sampled.py", "kernels/events/test_lift_off.py"),
-    "hybrid/kernels/events/initial_mode.py": (
+    "hybrid/kernels/runs/initial_mode.py": (
         "simulation/test_simulate.py",
         "kernels/jumps/test_instant.py",
         "kernels/jumps/test_one_instant.py",
@@ -141,7 +141,7 @@ NEAREST = {
         "kernels/events/test_condition.py",
         "kernels/events/test_curvature.py",
     ),
-    "hybrid/kernels/events/sections.py": ("orbits/test_sections.py",),
+    "hybrid/kernels/runs/sections.py": ("orbits/test_sections.py",),
     "hybrid/kernels/guards/touch.py": ("kernels/events/test_grazing.py",),
     "hybrid/kernels/jumps/corner.py": ("kernels/jumps/test_one_instant.py", "kernels/jumps/test_instant.py"),
     "hybrid/kernels/jumps/jump.py": (

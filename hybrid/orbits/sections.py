@@ -180,7 +180,7 @@ def strobe(trajectory: Trajectory, count: int) -> tuple[np.ndarray, np.ndarray, 
     """
     states = np.empty((count, trajectory.model.dimension))
     places = np.empty((count, 3), dtype=np.int64)
-    kernel = load_kernels("hybrid.kernels.events.sections").strobe
+    kernel = load_kernels("hybrid.kernels.runs.sections").strobe
     reached = np.zeros(1, dtype=np.int64)
     record, bursts = trajectory.no_record(), Bursts([trajectory])
     advance, phase = load_kernels().advance, trajectory.phase0

@@ -100,7 +100,7 @@ def _verdicts(
     Also the values of guards that are not finite, by transition, if there are several modes.
     """
     verdicts = np.zeros(len(system.transitions), dtype=np.int64)
-    try_modes = load_kernels("hybrid.kernels.events.initial_mode").try_modes
+    try_modes = load_kernels("hybrid.kernels.runs.initial_mode").try_modes
     kernel = partial(try_modes, plan.parts_so_far, model, plan.method, run, work)
     undefined: dict[int, float] = {}
     if len(modes) == len(system.mode_names):

@@ -114,7 +114,7 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: i
     plan = compiled.plans.get((solver, tangents, by_steps))
     if plan is None:
         system = compiled.system
-        load_kernels("hybrid.kernels.events.initial_mode")
+        load_kernels("hybrid.kernels.runs.initial_mode")
         n, modes, transitions = system.dimension, len(system.modes), len(system.transitions)
         kinds = propagator_kinds(compiled, solver, tangents)
         if by_steps is not None:

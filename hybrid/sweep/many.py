@@ -238,7 +238,7 @@ class _Runs:
         compiled = self.compiled = compile_system(system)
         # Before threads need the same kernels.
         plan = self.plan = plan_of(compiled, options["solver"], 0)
-        load_kernels("hybrid.kernels.events.many")
+        load_kernels("hybrid.kernels.runs.many")
         self.model = compiled.given(options["parameters"], plan.model)
         for time in t_span:
             check_time("t_span", time, self.model.period)
@@ -269,7 +269,7 @@ class _Runs:
         crew = Crew(together(self.compiled, plan, 0), plan, tasks, jobs)
         most = self.options["solver"].max_steps
         crew.memory.max_steps[:], crew.memory.max_jumps[:] = most, self.max_jumps
-        onward = load_kernels("hybrid.kernels.events.many").sampled
+        onward = load_kernels("hybrid.kernels.runs.many").sampled
         is_told = np.zeros(len(block), dtype=bool)
         under_way = list(range(count))
         while under_way:

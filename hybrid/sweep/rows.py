@@ -86,7 +86,7 @@ class Rows:
 
     def prepare(self, tangents: int) -> None:
         """Compile and load all that the rows need, so that threads do not do so at the same time."""
-        load_kernels("hybrid.kernels.events.sections")
+        load_kernels("hybrid.kernels.runs.sections")
         with_tangents = aged(self.system) if tangents else self.system
         for system, count in {(with_tangents, tangents), (self.system, 0), (self.marked, 0)}:
             plan_of(compile_system(system), self.solver, count)

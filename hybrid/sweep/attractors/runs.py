@@ -50,7 +50,7 @@ class Runs:
         # The kernel does not choose among the parts of one mode.
         self.in_parts = len(parts) > 1
         # Before threads need the same kernels.
-        load_kernels("hybrid.kernels.events.settle")
+        load_kernels("hybrid.kernels.runs.settle")
         self.parts = self.plan.parts
 
     def settle(
@@ -90,7 +90,7 @@ class Runs:
         tasks = [each.task(self.model, orthonormal=False) for each in memories]
         crew = Crew(together(self.compiled, plan, 0), plan, tasks, jobs)
         crew.memory.max_steps[:] = self.setup.solver.max_steps
-        onward = load_kernels("hybrid.kernels.events.settle").settle
+        onward = load_kernels("hybrid.kernels.runs.settle").settle
         under_way = list(range(count))
         while under_way:
             crew.memory.codes[:] = codes.DONE
@@ -152,7 +152,7 @@ class Points:
         """The next states ``(N, n)``, with modes and jumps so far ``(N, 2)``; ``code`` tells why fewer."""
         states = np.empty((count, self.trajectory.model.dimension))
         places = np.zeros((count, 2), dtype=np.int64)
-        kernel, advance = load_kernels("hybrid.kernels.events.settle").collect, load_kernels().advance
+        kernel, advance = load_kernels("hybrid.kernels.runs.settle").collect, load_kernels().advance
         bursts, code = Bursts([self.trajectory]), codes.GO_ON
         self.progress.points = 0
         parts = self.trajectory.plan.parts

@@ -77,7 +77,7 @@ def test_short_work_is_not(capsys):
 def shared_kernels(tmp_path):
     """A cache folder with the compiled kernels of this process and without models."""
     load_kernels()
-    load_kernels("hybrid.kernels.events.sections")
+    load_kernels("hybrid.kernels.runs.sections")
     for kernels in cache_directory().glob("kernels-*"):
         (tmp_path / kernels.name).symlink_to(kernels)
     return tmp_path

@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from hybrid.kernels.events.many import begin_next, guards_beyond
+from hybrid.kernels.runs.many import begin_next, guards_beyond
 from hybrid.kernels.types.abreast import Crew
 from hybrid.kernels.types.attractors import Progress, Section
 from hybrid.kernels.types.codes import (

@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from hybrid.kernels.events.initial_mode import verdicts_on
+from hybrid.kernels.runs.initial_mode import verdicts_on
 from hybrid.kernels.types import notes
 from hybrid.kernels.types.abreast import Crew
 from hybrid.kernels.types.codes import (

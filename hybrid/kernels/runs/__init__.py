@@ -1,0 +1,1 @@
+"""Whole runs: from one start to the next, without leaving the compiled code."""
