@@ -25,7 +25,6 @@ from hybrid.kernels.events.guards import (
     guard_speed,
     guard_value,
     rounding_band,
-    size_of_time,
 )
 from hybrid.kernels.events.onset import BY_SPEED, LATER
 from hybrid.kernels.events.path import end_of, time_along, time_at
@@ -224,37 +223,11 @@ def moved_by_error(model, work):
 
 
 @njit(**KERNEL)
-def keeps_sign(model, transition, t, x, work):
-    """Whether a guard has one sign for all errors of the state, ``work.path_error``, on a straight line."""
-    positive = False
-    for part in range(2):
-        share = MARGIN if part == 0 else -MARGIN
-        for i in range(model.dimension):
-            work.state[i] = x[i] + share * work.path_error[i]
-        value = guard_value(model, transition, t, work.state, work.scalar)
-        if part == 0:
-            positive = value > 0.0
-        elif (value > 0.0) != positive:
-            return False
-    return True
-
-
-@njit(**KERNEL)
-def is_resolved_in_series(model, run, transition, column, path, work):
-    """Whether what its series leaves out leaves the sign of a guard at both ends of the step alone."""
-    series, order, t, h = path.powers, path.degree, path.start, path.length
-    if 0.0 < abs(series[0, column]) < UNDERFLOW:
-        # The last terms have no digits.
-        return False
-    # Rounding of a sum of terms that cancel is less on a shorter step, rounding of the state is not.
-    error = MARGIN * last_terms(series, column, order, h) + EPSILON * series[order + 2, column]
-    if not is_close(series, column, order, error):
-        return True
-    model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
-    size = abs(work.gradient[model.dimension]) * size_of_time(model, t)
-    for i in range(model.dimension):
-        size += abs(work.gradient[i]) * max(abs(run.y[i]), abs(series[order + 1, i]))
-    return error <= in_column(path, column, ROUNDING_OF_STATE * EPSILON * size)
+def is_clear(model, transition, t, x, work):
+    """Whether a guard is farther from zero at ``x (n,)`` than the error of the step may move it."""
+    value = abs(guard_value(model, transition, t, x, work.scalar))
+    model.guard_gradient(transition, t, x, model.parameters, work.gradient)
+    return not value < MARGIN * moved_by_error(model, work)
 
 
 @njit(**KERNEL)
@@ -283,7 +256,7 @@ def leaves_as_known(model, run, transition, path, work):
 
 
 @njit(**KERNEL)
-def is_resolved(model, run, transition, column, path, attempted, on_guard, work):
+def is_resolved(model, run, transition, path, attempted, on_guard, work):
     """Whether the error of a step leaves the sign of a guard at both of its ends alone.
 
     It is not asked of a guard that is zero at the start and has stayed so, nor in a series: the derivatives
@@ -292,8 +265,6 @@ def is_resolved(model, run, transition, column, path, attempted, on_guard, work)
     if not attempted:
         if on_guard > 0 or model.degree[run.mode] > 0:
             return True
-        if column != NO_COLUMN:
-            return is_resolved_in_series(model, run, transition, column, path, work)
         keep_error_of_series(model, path, work)
     elif on_guard > 0:
         asked = on_guard == BY_SPEED and run.since_entry == 0.0
@@ -301,8 +272,8 @@ def is_resolved(model, run, transition, column, path, attempted, on_guard, work)
     end_of(path, model.dimension, work.trial)
     later = time_at(path, path.length)
     return (
-        keeps_sign(model, transition, path.start, run.y, work)
-        and keeps_sign(model, transition, later, work.trial, work)
+        is_clear(model, transition, path.start, run.y, work)
+        and is_clear(model, transition, later, work.trial, work)
     ) or moves_on(model, run, transition, path, work)
 
 
@@ -370,7 +341,7 @@ def crossing_by_leading(model, run, guard, path, attempted, work):
     bracket = Bracket(start * h, end * h, work.stack[row, 2], work.stack[row, 2 + degree])
     last = powers[order + 1, column] if end == 1.0 else work.stack[row, 2 + degree]
     certain = min(work.stack[row, 2] * side, -last * side) > guard.band + rest
-    resolved = seen or is_resolved(model, run, transition, column, path, attempted, guard.on_guard, work)
+    resolved = seen or is_resolved(model, run, transition, path, attempted, guard.on_guard, work)
     run.event_side[transition] = side
     run.crossings += 1 if certain and resolved else UNCERTAIN
     return CROSSES, root_between(path, column, guard.known, bracket, side) / h, resolved
@@ -396,7 +367,7 @@ def crossing_by_pieces(task, transition, column, path, attempted):
         small = underflows_in_column(path.powers, column, order)
     if small:
         return NO_ROOT, share, True
-    resolved = is_resolved(model, run, transition, column, path, attempted, on_guard, work)
+    resolved = is_resolved(model, run, transition, path, attempted, on_guard, work)
     keep_outcome(run, transition, theta, side)
     return theta, share, resolved
 
