@@ -187,12 +187,6 @@ def last_terms(series, column, order, h):
 
 
 @njit(**INLINE)
-def is_close(powers, column, order, error):
-    """Whether a guard that is a column is closer to zero than an error at an end of the step."""
-    return abs(powers[order + 1, column]) < error or abs(powers[0, column]) < error
-
-
-@njit(**INLINE)
 def underflows_in_column(powers, column, order):
     """``underflows`` for a guard that is a column of the path."""
     return max(abs(powers[0, column]), abs(powers[order + 1, column])) < UNDERFLOW
@@ -243,38 +237,22 @@ def moves_on(model, run, transition, path, work):
 
 
 @njit(**KERNEL)
-def leaves_as_known(model, run, transition, path, work):
-    """Whether a guard that leaves zero by its speed grows by more than the error of the step.
-
-    If not, the error may have made a crossing, or hide one. A shorter step has less error.
-    """
-    t = path.start
-    model.field(run.mode, t, run.y, model.parameters, work.field)
-    speed = guard_speed(model, transition, t, run.y, work.field, work.gradient)
-    growth = time_along(path, path.length) * speed * run.side[transition]
-    return math.isnan(growth) or growth > MARGIN * moved_by_error(model, work)
-
-
-@njit(**KERNEL)
 def is_resolved(model, run, transition, path, attempted, on_guard, work):
     """Whether the error of a step leaves the sign of a guard at both of its ends alone.
 
-    It is not asked of a guard that is zero at the start and has stayed so, nor in a series: the derivatives
-    tell its side. An ``attempted`` step has its error in ``work.path_error``.
+    It is not asked of a guard that is zero at the start, but for a step that leaves it after a jump: the
+    derivatives tell its side. An ``attempted`` step has its error in ``work.path_error``.
     """
+    asked = on_guard == 0 or (attempted and on_guard == BY_SPEED and run.since_entry == 0.0)
+    if not asked or (not attempted and model.degree[run.mode] > 0):
+        return True
     if not attempted:
-        if on_guard > 0 or model.degree[run.mode] > 0:
-            return True
         keep_error_of_series(model, path, work)
-    elif on_guard > 0:
-        asked = on_guard == BY_SPEED and run.since_entry == 0.0
-        return not asked or leaves_as_known(model, run, transition, path, work)
     end_of(path, model.dimension, work.trial)
     later = time_at(path, path.length)
-    return (
-        is_clear(model, transition, path.start, run.y, work)
-        and is_clear(model, transition, later, work.trial, work)
-    ) or moves_on(model, run, transition, path, work)
+    begins = on_guard > 0 or is_clear(model, transition, path.start, run.y, work)
+    clear = begins and is_clear(model, transition, later, work.trial, work)
+    return clear or moves_on(model, run, transition, path, work)
 
 
 class Leading(NamedTuple):
@@ -335,13 +313,10 @@ def crossing_by_leading(model, run, guard, path, attempted, work):
         return UNKNOWN, NO_ROOT, True
     if underflows_in_column(powers, column, order):
         return CROSSES, NO_ROOT, True
-    # What is far from a bound for the last terms of a series is resolved.
-    seen = not attempted and degree <= order - TAIL_OF_GUARD
-    seen = seen and not is_close(powers, column, order, MARGIN * rest + UNDERFLOW)
     bracket = Bracket(start * h, end * h, work.stack[row, 2], work.stack[row, 2 + degree])
     last = powers[order + 1, column] if end == 1.0 else work.stack[row, 2 + degree]
     certain = min(work.stack[row, 2] * side, -last * side) > guard.band + rest
-    resolved = seen or is_resolved(model, run, transition, path, attempted, guard.on_guard, work)
+    resolved = is_resolved(model, run, transition, path, attempted, guard.on_guard, work)
     run.event_side[transition] = side
     run.crossings += 1 if certain and resolved else UNCERTAIN
     return CROSSES, root_between(path, column, guard.known, bracket, side) / h, resolved
