@@ -141,3 +141,10 @@ def test_the_page_on_statuses_has_one_row_per_code():
 def test_links_lead_somewhere(page):
     for target in LINK.findall(page.read_text(encoding="utf-8")):
         assert (page.parent / target).exists(), target
+
+
+def test_the_tests_to_read_first_are_there():
+    tests = Path(__file__).parent
+    named = re.findall(r"^\| `(\S+\.py)` \|", (tests / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert len(named) == 20
+    assert [name for name in named if not (tests / name).is_file()] == []

@@ -29,8 +29,6 @@ from hybrid.kernels.types.options import KERNEL
 
 # The guard of an event is beyond zero by this share of its band, one and a half units in the last place.
 MOST_BEYOND = 1.5 / ROUNDING_OF_STATE
-# The next number beyond a guard that is exactly zero, and so has no rounding.
-NEXT_TO_ZERO = 1e-200
 # A landing is no farther from its guard, or from its jump, than so many times the rounding of the state.
 MOST_BANDS = 64.0
 # The flow goes on through the guard if its speed keeps this share on the way.
@@ -47,16 +45,6 @@ def _is_beyond(model, run, transition, side, t, x, work):
         return True
     model.guard_gradient(transition, t, x, model.parameters, work.gradient)
     return value >= MOST_BEYOND * rounding_band(model, run, transition, t, x, work)
-
-
-@njit(**KERNEL)
-def _distance_beyond(model, run, transition, side, t, work):
-    """How far a guard is from the place beyond its rounding; ``work.gradient`` is current.
-
-    A little farther than needed: the place is rounded, too.
-    """
-    value = guard_value(model, transition, t, run.y, work.scalar) * side
-    return 1.5 * MOST_BEYOND * rounding_band(model, run, transition, t, run.y, work) + NEXT_TO_ZERO - value
 
 
 @njit(**KERNEL)
@@ -95,19 +83,16 @@ def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, work):
     if _is_beyond(model, run, transition, side, t, run.y, work):
         return
     model.field(mode, t, run.y, model.parameters, work.field)
-    moment = moment_of_rounding(model, run, t, work)
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient) * side
-    span, distance = 0.0, _distance_beyond(model, run, transition, side, t, work)
-    if not jumps and 0.0 < speed < math.inf and 0.0 < distance < math.inf:
-        span = distance / speed
-    # A landing takes no longer than the stay that it ends.
+    moment = moment_of_rounding(model, run, t, work)
+    if 0.0 < speed < math.inf:
+        moment = max(moment, rounding_band(model, run, transition, t, run.y, work) / speed)
+    # A landing takes no longer than the stay that it ends. Each try is twice as long as the last.
     longest = max(run.since_entry, MOST_BANDS * EPSILON * size_of_time(model, t))
-    farthest = min(max(2.0 * span, MOST_BANDS * moment), longest)
-    if span == 0.0 or model.affine_guard[transition] == 0:
-        # At a jump or a flat root the speed is no measure of the way.
-        span = min(_shortest_span(model, run, t, work), longest)
+    span = min(_shortest_span(model, run, t, work), longest)
+    longest = min(MOST_BANDS * moment, longest)
     cycle, low = run.cycle, run.phase_low
-    while 0.0 < span <= farthest:
+    while 0.0 < span <= longest:
         for i in range(n):
             work.state[i] = run.y[i] + span * work.field[i]
         forward(run, model.period, span)

@@ -236,8 +236,21 @@ def moves_on(model, run, transition, path, work):
     return before * after > 0.0 and way > MARGIN * moved_by_error(model, work)
 
 
+@njit(**INLINE)
+def is_clear_in_column(path, column):
+    """Whether a guard that is a column of a series is farther from zero at both ends than its last terms.
+
+    What is less than the rounding of all its terms is no error.
+    """
+    powers, order = path.powers, path.degree
+    error = last_terms(powers, column, order, path.length)
+    if error <= ROUNDING_OF_STATE * EPSILON * powers[order + 2, column]:
+        return True
+    return min(abs(powers[0, column]), abs(powers[order + 1, column])) >= MARGIN * error
+
+
 @njit(**KERNEL)
-def is_resolved(model, run, transition, path, attempted, on_guard, work):
+def is_resolved(model, run, transition, column, path, attempted, on_guard, work):
     """Whether the error of a step leaves the sign of a guard at both of its ends alone.
 
     It is not asked of a guard that is zero at the start, but for a step that leaves it after a jump: the
@@ -246,6 +259,8 @@ def is_resolved(model, run, transition, path, attempted, on_guard, work):
     asked = on_guard == 0 or (attempted and on_guard == BY_SPEED and run.since_entry == 0.0)
     if not asked or (not attempted and model.degree[run.mode] > 0):
         return True
+    if not attempted and column != NO_COLUMN:
+        return is_clear_in_column(path, column)
     if not attempted:
         keep_error_of_series(model, path, work)
     end_of(path, model.dimension, work.trial)
@@ -316,7 +331,7 @@ def crossing_by_leading(model, run, guard, path, attempted, work):
     bracket = Bracket(start * h, end * h, work.stack[row, 2], work.stack[row, 2 + degree])
     last = powers[order + 1, column] if end == 1.0 else work.stack[row, 2 + degree]
     certain = min(work.stack[row, 2] * side, -last * side) > guard.band + rest
-    resolved = is_resolved(model, run, transition, path, attempted, guard.on_guard, work)
+    resolved = is_resolved(model, run, transition, column, path, attempted, guard.on_guard, work)
     run.event_side[transition] = side
     run.crossings += 1 if certain and resolved else UNCERTAIN
     return CROSSES, root_between(path, column, guard.known, bracket, side) / h, resolved
@@ -342,7 +357,7 @@ def crossing_by_pieces(task, transition, column, path, attempted):
         small = underflows_in_column(path.powers, column, order)
     if small:
         return NO_ROOT, share, True
-    resolved = is_resolved(model, run, transition, path, attempted, on_guard, work)
+    resolved = is_resolved(model, run, transition, column, path, attempted, on_guard, work)
     keep_outcome(run, transition, theta, side)
     return theta, share, resolved
 
