@@ -134,30 +134,14 @@ for _operator, _instruction in (
 
 
 @intrinsic
-def exponent_and_mantissa(typing_context, numbers):
-    """The exponents of positive numbers, and their mantissas minus 1."""
+def bits_of_floats(typing_context, numbers):
+    """The bits of positive floats, as numbers: all but the last few."""
 
     def generate(context, builder, signature, arguments):
-        width = numbers.width
-        whole, kind = whole_numbers(width), vector_of(width)
+        bits = builder.bitcast(arguments[0], whole_numbers(numbers.width))
+        return builder.sitofp(bits, vector_of(numbers.width))
 
-        def everywhere_whole(number):
-            return whole([number] * width)
-
-        bits = builder.bitcast(arguments[0], whole)
-        exponent = builder.lshr(bits, everywhere_whole(BITS_OF_MANTISSA))
-        # A small integer in the last bits of the float 2**52 adds its value to the float.
-        large = (BIAS + BITS_OF_MANTISSA) << BITS_OF_MANTISSA
-        exponent = builder.fsub(
-            builder.bitcast(builder.or_(exponent, everywhere_whole(large)), kind),
-            kind([2.0**BITS_OF_MANTISSA + BIAS] * width),
-        )
-        mantissa = builder.and_(bits, everywhere_whole((1 << BITS_OF_MANTISSA) - 1))
-        mantissa = builder.or_(mantissa, everywhere_whole(BIAS << BITS_OF_MANTISSA))
-        mantissa = builder.fsub(builder.bitcast(mantissa, kind), kind([1.0] * width))
-        return context.make_tuple(builder, signature.return_type, (exponent, mantissa))
-
-    return types.UniTuple(numbers, 2)(numbers), generate
+    return numbers(numbers), generate
 
 
 @intrinsic
