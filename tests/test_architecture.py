@@ -66,6 +66,7 @@ KERNEL_ROOMS = tuple(
         "evaluate",
         "drive",
         "abreast",
+        "runs",
     )
 )
 DOOR = "hybrid.kernels.types.numba_door"
