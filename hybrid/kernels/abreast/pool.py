@@ -92,17 +92,12 @@ def go_to_next_step(parts, task, crew, onward, r, code):
 
 
 @njit(**KERNEL)
-def muster(parts, sea, crew, onward, r, left, row):
-    """Bring a run to where it takes its next step, and let it wait there; or to its end.
+def queue_up(sea, crew, r, room, left, row):
+    """Let a run wait for its next step, which has this ``room``.
 
     A run that goes on in the mode that it has ``left`` goes back into its lane, in that ``row``.
     """
-    task = task_at(crew.tasks[r])
-    code, room = go_to_next_step(parts, task, crew, onward, r, GO_ON)
-    if code != GO_ON:
-        crew.codes[r] = code
-        return
-    queue = crew.aboard.shape[0]
+    task, queue = task_at(crew.tasks[r]), crew.aboard.shape[0]
     if crew.refused[r] == 0 and begins_plainly(task.model, task.method, task.run, sea):
         queue = task.run.mode
         crew.rooms[r, 0], crew.rooms[r, 1] = room.remains, room.until
@@ -116,6 +111,16 @@ def muster(parts, sea, crew, onward, r, left, row):
 
 
 @njit(**KERNEL)
+def muster(parts, sea, crew, onward, r, code, left, row):
+    """Bring a run to where it takes its next step, and let it wait there; or to its end (``queue_up``)."""
+    code, room = go_to_next_step(parts, task_at(crew.tasks[r]), crew, onward, r, code)
+    if code == GO_ON:
+        queue_up(sea, crew, r, room, left, row)
+    else:
+        crew.codes[r] = code
+
+
+@njit(**KERNEL)
 def step_alone(advance, parts, sea, crew, onward, r):
     """One step of a run that is not taken abreast, with what follows at its end."""
     task = task_at(crew.tasks[r])
@@ -124,12 +129,9 @@ def step_alone(advance, parts, sea, crew, onward, r):
     crew.alone += 1
     crew.refused[r] = 0
     code = advance(parts, task, crew.cycles[r], crew.phases[r], most, crew.max_jumps[r])
-    if code != MAX_STEPS or task.run.steps >= crew.max_steps[r]:
-        code = onward(parts, task, crew, r, code)
-        if code != GO_ON:
-            crew.codes[r] = code
-            return
-    muster(parts, sea, crew, onward, r, NO_MODE, 0)
+    if code == MAX_STEPS and task.run.steps < crew.max_steps[r]:
+        code = GO_ON
+    muster(parts, sea, crew, onward, r, code, NO_MODE, 0)
 
 
 @njit(**KERNEL)
@@ -189,12 +191,7 @@ def arrive(parts, sea, crew, onward, places, mode, row):
         go_forward(model, run, gap)
     alone, length = reaches_one_guard(model, run), sea.ends[row] + gap
     code = conclude(parts, task, room, gap, length, crew.cycles[r], crew.phases[r], alone)
-    if code != GO_ON:
-        code = onward(parts, task, crew, r, code)
-    if code != GO_ON:
-        crew.codes[r] = code
-        return
-    muster(parts, sea, crew, onward, r, mode, row)
+    muster(parts, sea, crew, onward, r, code, mode, row)
 
 
 @njit(**KERNEL)
@@ -215,7 +212,7 @@ def stop_on_the_way(parts, sea, crew, onward, places, mode, row):
     # Another run has begun, a guard was reached, or the tangent vector is another one.
     if run.steps == 0 or run.jumps > jumps or (tangents > 0 and before == 0.0):
         crew.aboard[mode, row] = NOBODY
-        muster(parts, sea, crew, onward, r, mode, row)
+        queue_up(sea, crew, r, room, mode, row)
         return
     factor = run.y[entry] / before if tangents > 0 else 1.0
     look_ahead(sea, lane, places, task, room.all, factor, row)
@@ -234,7 +231,7 @@ def stay_behind(parts, sea, crew, onward, places, mode, row):
     r = crew.aboard[mode, row]
     crew.aboard[mode, row], crew.refused[r] = NOBODY, 1
     leave_lane(sea.lanes[mode], places, task_at(crew.tasks[r]), row)
-    muster(parts, sea, crew, onward, r, mode, row)
+    muster(parts, sea, crew, onward, r, GO_ON, mode, row)
 
 
 @njit(**KERNEL)
@@ -283,7 +280,7 @@ def advance_abreast(advance, parts, sea, crew, onward):
             crew.codes[r] = onward(parts, task_at(crew.tasks[r]), crew, r, GO_ON)
             if crew.codes[r] != GO_ON:
                 continue
-            muster(parts, sea, crew, onward, r, NO_MODE, 0)
+            muster(parts, sea, crew, onward, r, GO_ON, NO_MODE, 0)
     alone = crew.aboard.shape[0]
     while crew.steps + crew.alone < crew.budget:
         # One at a time, and all those that are alone before the others, who wait for them.
