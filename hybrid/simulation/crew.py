@@ -28,9 +28,9 @@ ROWS_OF_END, SPARE_COLUMNS = 5, 3
 # A guard that is zero at the start is divided by its variable: it has a power more.
 POWERS = DEGREE + 2
 # Steps after which a run leaves its lane, so that Python hears of it; and in which tangent vectors that are
-# kept orthonormal may come too close: as often as ``arithmetic.tangent.keep_apart`` looks, one alone seldom.
-LONGEST_STAY, ALONE = 256, 32
-APART = {codes.TAYLOR: 1, codes.ROOTED: 1, codes.EXACT: 2, codes.DESINGULARISED: 16}
+# kept orthonormal may come too close.
+LONGEST_STAY = 256
+APART = {codes.EXACT: codes.STEPS_IN_EXACT, codes.DESINGULARISED: codes.STEPS_IN_CONTACT}
 # Runs that are advanced together: enough that lanes are full.
 TOGETHER = 3 * codes.ABREAST
 # Steps of the first burst of a crew, and seconds of the others.
@@ -102,7 +102,7 @@ def _together(compiled: CompiledSystem, plan: Any, tangents: int) -> Together:
         "weights": (length * width,),
         "polynomial": (POWERS * width,),
         "moved": (POWERS * width,),
-        "ends": (2 * width,),
+        "ends": (width,),
         "stops": (2 * width,),
         "fired": (width,),
     }
@@ -116,7 +116,7 @@ def _together(compiled: CompiledSystem, plan: Any, tangents: int) -> Together:
         tangent_columns=np.array(strides, dtype=np.int64),
     )
     kinds = [each.kind for each in emitted.propagators]
-    apart = [APART.get(kind, 1) if tangents > 1 else ALONE for kind in kinds]
+    apart = [APART.get(kind, 1) if tangents > 1 else codes.STEPS_ALONE for kind in kinds]
     longest = np.full(len(kinds), LONGEST_STAY), np.array(apart)
     return Together(series, able_of, longest, len(system.parameters), layout)
 

@@ -25,7 +25,6 @@ from hybrid.kernels.types.abreast import (
     DIVERGENCE,
     FOLLOWS,
     LANE_NUMBERS,
-    LEADS_ON,
     LONGEST_STEP,
     PER_GUARD,
     PERIOD,
@@ -36,7 +35,7 @@ from hybrid.kernels.types.abreast import (
     STEPS,
     T,
 )
-from hybrid.kernels.types.codes import ABREAST, DESINGULARISED, READY
+from hybrid.kernels.types.codes import ABREAST, READY
 from hybrid.kernels.types.kinds import INTEGER
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -61,16 +60,6 @@ def places_in(model, tangents, parameters, mode):
     return Places(first, numbers, sizes, sizes + n, number_of_guards(model, mode))
 
 
-@njit(**INLINE)
-def leads_on(model, mode, tangents):
-    """Whether a step may lead beyond the time at which a run is asked for: nothing else ends its room.
-
-    Tangent vectors may be exchanged there for others; one is at most scaled.
-    """
-    timeless = model.clocks.shape[0] == 0 and model.knots.shape[0] == 0
-    return timeless and tangents <= 1 and model.degree[mode] == 0 and model.propagator[mode] != DESINGULARISED
-
-
 @njit(**KERNEL)
 def come_aboard(lane, places, task, room, row):
     """Write where a run is, at the start of a step, into its place in a lane."""
@@ -91,7 +80,6 @@ def come_aboard(lane, places, task, room, row):
     lane[first + STEPS * ABREAST], lane[first + DIVERGENCE * ABREAST] = 0.0, 0.0
     lane[first + FOLLOWS * ABREAST] = 1.0 if run.stage == READY else 0.0
     lane[first + PERIOD * ABREAST] = model.period
-    lane[first + LEADS_ON * ABREAST] = 1.0 if leads_on(model, mode, task.tangents) else 0.0
     for i in range(n):
         lane[(places.sizes + i) * ABREAST + row] = run.scale[i]
     slot, place = model.first_outgoing[mode], places.guards * ABREAST + row

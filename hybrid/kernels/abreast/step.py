@@ -38,7 +38,6 @@ from hybrid.kernels.types.abreast import (
     CYCLE,
     DIVERGENCE,
     FOLLOWS,
-    LEADS_ON,
     LONGEST_STEP,
     PER_GUARD,
     PERIOD,
@@ -105,6 +104,16 @@ def longest_room(model, lane, places, mode):
     left = rows_at(lane, places.numbers + STAY) - rows_at(lane, places.numbers + SINCE)
     beyond = rows_at(lane, places.numbers + AHEAD_OF_STAY)
     return where(both(left > 0.0, beyond > 0.0), left + beyond, math.inf)
+
+
+@njit(**INLINE)
+def leads_on(model, mode, tangents):
+    """Whether a step may lead beyond the time at which a run is asked for: nothing else ends its room.
+
+    Tangent vectors may be exchanged there for others; one is at most scaled.
+    """
+    timeless = model.clocks.shape[0] == 0 and model.knots.shape[0] == 0
+    return timeless and tangents <= 1 and model.degree[mode] == 0 and model.propagator[mode] != DESINGULARISED
 
 
 @njit(**INLINE)
@@ -194,9 +203,9 @@ def step_abreast(model, method, sea, lane, places, mode, tangents, asked):
     late = without(asked, asked)
     if model.timed[mode] == 1:
         late = method.rtol * rows_at(lane, first + LONGEST_STEP) < EPSILON * t
-    leads_on = without(rows_at(lane, first + LEADS_ON) > 0.5, late)
+    onward = without(asked, late) if leads_on(model, mode, tangents) else without(asked, asked)
     if not on_clock:
-        room = smaller(where(leads_on, math.inf, remaining), longest_room(model, lane, places, mode))
+        room = smaller(where(onward, math.inf, remaining), longest_room(model, lane, places, mode))
         h = smaller(h, smaller(room, method.max_step))
         able = both(able, h < ANY_LENGTH)
     else:
@@ -228,9 +237,7 @@ def step_abreast(model, method, sea, lane, places, mode, tangents, asked):
         for column in range(start + k * stride, start + k * stride + n, 4):
             evaluate_four(powers, column, order, h, False, order + 1)
     put_rows(sea.ends, 0, time)
-    put_rows(sea.ends, 1, h)
-    going = without(able, event)
-    passes, before = both(able, leads_on), time < remaining
-    sea.stopping = bits_of(without(both(passes, either(going, time > remaining)), before))
+    going, before = without(able, event), time < remaining
+    sea.stopping = bits_of(without(both(both(able, onward), either(going, time > remaining)), before))
     take_step(model, sea, lane, places, mode, tangents, order, able)
-    return able, without(both(going, either(before, leads_on)), late)
+    return able, without(both(going, either(before, onward)), late)

@@ -10,6 +10,9 @@ from hybrid.kernels.types.codes import (
     READY,
     RUNGE_KUTTA,
     STALE,
+    STEPS_ALONE,
+    STEPS_IN_CONTACT,
+    STEPS_IN_EXACT,
 )
 from hybrid.kernels.types.kinds import INTEGER, MATRIX
 from hybrid.kernels.types.layout import Model, Run
@@ -28,12 +31,6 @@ STRAINED = math.log(1e3)
 # ``10**-d`` costs ``d`` digits of that part. An exact step has rounding errors only. A Runge-Kutta method has
 # to evaluate the rates once more after orthonormalisation.
 CLOSE_IN_EXACT, CLOSE_IN_TAYLOR, CLOSE_IN_RUNGE_KUTTA = 1e-3**2, 1e-1**2, 1e-2**2
-# Steps between two checks. An exact step brings the vectors closer by a factor of a few thousand at most. A
-# stiff contact stretches all vectors along the speed and shrinks them again before it ends: such stretching
-# is no sign of exponents that are far apart.
-STEPS_IN_EXACT, STEPS_IN_CONTACT = 2, 16
-# One vector has no other that it could come close to: it is only kept from growing without bound.
-STEPS_ALONE = 32
 # Tangent vectors are also orthonormalised when the square of a length leaves this range.
 SHORTEST_SQUARE, LONGEST_SQUARE = 1e-200, 1e200
 

@@ -4,8 +4,6 @@ from contextlib import contextmanager
 
 from llvmlite import ir
 
-BIT = ir.IntType(1)
-
 
 def declared(module, kind, name):
     """The function of a name, which is declared in the module if it is not yet."""

@@ -7,10 +7,10 @@ from hybrid.kernels.types.structure import Structure
 # Numbers of a lane besides state, parameters, sizes: time, what it has lost in rounding, whole periods; the
 # time since the entry, the longest step; the time until the next step must end; the time that the last stay
 # took, and its share by which a step may exceed that; the steps taken, the integral of div f, whether the
-# roots are those of a step, the period, whether a step may lead beyond its room.
+# roots are those of a step, the period.
 T, PHASE_LOW, CYCLE, SINCE, LONGEST_STEP, ROOM, STAY, AHEAD_OF_STAY, STEPS, DIVERGENCE = range(10)
-FOLLOWS, PERIOD, LEADS_ON = range(10, 13)
-LANE_NUMBERS = 13
+FOLLOWS, PERIOD = 10, 11
+LANE_NUMBERS = 12
 # Those of each guard: its side, whether it is zero at the start of the step, the root that the last one left,
 # and how far errors may have moved it at the end of the step.
 PER_GUARD = 4
@@ -26,9 +26,9 @@ class Abreast(Structure, counters=("distant", "stopping", "distant_at_stop")):
     ``series`` computes the series of a mode in ``powers (order + 5 + guards, columns)``, ``able (modes,)`` is
     1 for a mode that has one; tangent vectors begin at column ``tangent_start`` and have ``tangent_columns``
     of a mode each. ``lanes (modes, entries)`` is where the runs aboard are, at the start of their next step
-    (``lanes``). ``weights (n (1 + k),)``, ``polynomial`` and ``moved`` are scratch. A step leaves ``ends
-    (2,)``: the time and the length that it took; and by run, in ``fired (W,)``, the transition whose guard it
-    has reached. ``distant`` has the bits of the runs that are far from all guards at its end, ``stopping``
+    (``lanes``). ``weights (n (1 + k),)``, ``polynomial`` and ``moved`` are scratch. A step leaves by
+    run, in ``ends (W,)``, the time that it took, and in ``fired (W,)`` the transition whose guard it has
+    reached. ``distant`` has the bits of the runs that are far from all guards at its end, ``stopping``
     those of the runs that stop before, ``distant_at_stop`` those that are far from guards there. ``stops
     (2,)``: the part of the step after which a run stops, and by how much its tangent vector has been
     multiplied since the start.

@@ -60,7 +60,11 @@ LEADING = 16
 
 # Order of exact series, which no other exceeds: what the memory for series is laid out for.
 HIGHEST_ORDER = 32
-
+# Steps after which tangent vectors that are kept orthonormal are looked at. An exact step brings them closer
+# by a factor of a few thousand at most. A stiff contact stretches all vectors along the speed and shrinks
+# them again before it ends: such stretching is no sign of exponents that are far apart. One vector alone has
+# no other that it could come close to: it is only kept from growing without bound.
+STEPS_IN_EXACT, STEPS_IN_CONTACT, STEPS_ALONE = 2, 16, 32
 # Columns of series that are worked on at once, and in the widest register.
 NARROW = 4
 WIDE = 2 * NARROW
