@@ -32,7 +32,7 @@ from hybrid.kernels.jumps.locked import (
 from hybrid.kernels.jumps.past import impulse_of, remember_visit, slot_of
 from hybrid.kernels.jumps.record import remember_jump
 from hybrid.kernels.jumps.rest import rest_matrix
-from hybrid.kernels.jumps.steep import is_steep, is_steep_behind, keep_unknown_time
+from hybrid.kernels.jumps.steep import hides_roots, look_for_roots, note_steep
 from hybrid.kernels.types.codes import (
     ENTERING,
     GRAZING,
@@ -280,9 +280,8 @@ def jump(task, transition):
     kind = run.last_kind if locked else TRANSVERSE
     # The time of a tick is known.
     searched = not locked and model.clock[transition] == 0
-    steep = tangents > 0 and searched and is_steep(model, method, run, transition, tangents, work)
-    if searched:
-        keep_unknown_time(model, method, run, transition, work)
+    if searched and hides_roots(model, mode):
+        look_for_roots(model, method, run, transition, tangents, work)
     if locked:
         recall_map(model, run, tangents, work)
         target = model.target[transition]
@@ -312,9 +311,9 @@ def jump(task, transition):
         if kind == GRAZING:
             run.ill_conditioned_growth += grown
     leave(model, run, transition, transversality, work)
-    if tangents > 0 and not steep and not locked:
-        steep = is_steep_behind(model, method, run, transition, tangents, work)
-    run.steep_jumps += 1 if steep else 0
+    if searched and tangents > 0 and hides_roots(model, run.mode):
+        model.guard_gradient(transition, run.phase, run.y, model.parameters, work.gradient)
+        note_steep(model, method, run, transversality, work)
 
 
 @njit(**KERNEL)

@@ -24,10 +24,10 @@ from hybrid.kernels.jumps.jump import ends_own_flight, is_grazing, judge, move
 from hybrid.kernels.jumps.locked import postpone_map
 from hybrid.kernels.jumps.past import impulse_of
 from hybrid.kernels.jumps.record import remember_jump
+from hybrid.kernels.jumps.steep import hides_roots
 from hybrid.kernels.types.codes import (
     IMPULSE,
     NO_MODE,
-    RUNGE_KUTTA,
     TRANSVERSE,
 )
 from hybrid.kernels.types.kinds import INTEGER, REAL, TRUTH
@@ -59,10 +59,7 @@ def may_be_plain(model, run, fired, tangents):
         return False
     if tangents > 0 and not (model.field_before[fired] == mode and model.field_behind[fired] == target):
         return False
-    for each in (mode, target):
-        if model.steep[each] == 1 and model.propagator[each] == RUNGE_KUTTA:
-            return False
-    return True
+    return not (hides_roots(model, mode) or hides_roots(model, target))
 
 
 class Saltation(NamedTuple):
