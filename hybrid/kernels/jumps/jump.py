@@ -29,7 +29,7 @@ from hybrid.kernels.jumps.locked import (
     postpone_map,
     restore_tangents,
 )
-from hybrid.kernels.jumps.past import impulse_of, remember_visit, slot_of
+from hybrid.kernels.jumps.past import follows_impact, impulse_of, remember_visit, slot_of
 from hybrid.kernels.jumps.record import remember_jump
 from hybrid.kernels.jumps.rest import rest_matrix
 from hybrid.kernels.jumps.steep import hides_roots, look_for_roots, note_steep
@@ -164,8 +164,8 @@ def ends_own_flight(model, run, transition, transversality):
 
     A low bounce is no grazing: all orbits nearby hit the guard too, because the pull leads them back to it.
     """
-    bounces = run.chattering > 0 and run.chatter_jumps == run.jumps and run.last_fired == transition
-    return bounces and 2.0 * abs(transversality) >= run.trail[IMPULSE, model.dimension]
+    began = run.restitution * abs(run.last_transversality)
+    return run.last_fired == transition and follows_impact(model, run) and 2.0 * abs(transversality) >= began
 
 
 @njit(**KERNEL)

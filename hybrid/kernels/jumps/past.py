@@ -52,3 +52,11 @@ def impulse_of(model, run, transition, transversality, work, direction):
         rounding = abs(change) <= ROUNDING_OF_STATE * EPSILON * run.scale[i]
         direction[i] = 0.0 if rounding else change / (after - transversality)
     return -after / transversality
+
+
+@njit(**INLINE)
+def follows_impact(model, run):
+    """Whether the last jump was within a mode and has turned back a part of the guard's speed."""
+    fired = run.last_fired
+    within = fired >= 0 and run.mode == run.previous_mode and model.marker[fired] == 0
+    return within and 0.0 < run.restitution < 1.0

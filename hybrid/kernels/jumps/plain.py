@@ -195,7 +195,6 @@ def enters_plainly(model, run, fired, target, x, work):
     That guard leaves zero by its speed, to its near side. The sides go to ``run.tried_side``.
     """
     t, n = run.phase, model.dimension
-    run.speed_behind = run.acceleration_behind = 0.0
     for slot in range(model.first_outgoing[target], model.first_outgoing[target + 1]):
         other = model.outgoing[slot]
         direction = model.direction[other]
@@ -216,8 +215,6 @@ def enters_plainly(model, run, fired, target, x, work):
             if not (steady and -direction * speed > CLEAR_BY * drift and abs(speed) < math.inf):
                 return False
             run.tried_order[other] = BY_SPEED
-            if other == fired:
-                run.speed_behind, run.acceleration_behind = speed, bend
         elif not -direction * value > CLEAR_BY * band:
             return False
     return True

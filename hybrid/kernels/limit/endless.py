@@ -8,7 +8,7 @@ instant, where all else is at rest, only guards and conditions could still make 
 
 from numba import njit
 
-from hybrid.kernels.jumps.past import fired_before, time_between, visit_before
+from hybrid.kernels.jumps.past import fired_before, visit_before
 from hybrid.kernels.jumps.rest import ROUNDED
 from hybrid.kernels.limit.rounds import RESOLVED
 from hybrid.kernels.types.codes import BY_FLOW, BY_NOTHING, ENDLESS, HELD, NO_MODE
@@ -55,18 +55,12 @@ def mark_endless(model, run, turn, t, x, work):
 
 
 @njit(**KERNEL)
-def hold_endless(model, run, turn, left, work):
-    """Let the marked components keep their last values in ``work.settled (n,)``.
-
-    Between the jumps they move by their rate, which is that of the change from one round to the next.
-    """
-    last, before = run.visits[visit_before(run, 0)], run.visits[visit_before(run, turn)]
-    earlier = run.visits[visit_before(run, 2 * turn)]
-    shorter = time_between(model, run, turn, 2 * turn) - time_between(model, run, 0, turn)
+def hold_endless(model, run, left, work):
+    """Let the marked components keep their last values in ``work.settled (n,)``, but for their own rate."""
+    model.field(run.mode, run.phase, run.y, model.parameters, work.field)
     for i in range(model.dimension):
         if run.trail[ENDLESS, i] != 0.0:
-            rate = (2.0 * before[i] - last[i] - earlier[i]) / shorter if shorter > 0.0 else 0.0
-            work.settled[i] = last[i] + rate * left
+            work.settled[i] = run.y[i] + left * work.field[i]
 
 
 @njit(**KERNEL)

@@ -24,7 +24,7 @@ from hybrid.kernels.guards.isolate import first_change
 from hybrid.kernels.guards.pieces import NO_COLUMN, NOWHERE, Guard
 from hybrid.kernels.jumps.jump import assume_sizes, carry_tangents, go_onward, move
 from hybrid.kernels.jumps.locked import begin_instant
-from hybrid.kernels.jumps.past import fired_before, time_between
+from hybrid.kernels.jumps.past import fired_before, follows_impact, time_between
 from hybrid.kernels.jumps.record import remember_flight, remember_jump
 from hybrid.kernels.jumps.rest import ROUNDED
 from hybrid.kernels.limit.endless import hold_endless, mark_endless, may_be_held
@@ -71,9 +71,9 @@ def may_accumulate(model, run, transition):
 def known_limit(model, method, run, transition, work):
     """The series of jumps whose limit is known, as ``work.settled (n,)``; none if there is none yet.
 
-    Two estimates of time and state agree up to the tolerances. Once they get no closer from round to round,
-    they may differ by what the rounding of a landing hides: it is magnified by the sum of the series and by
-    the rounding of its ratio, but it hides no more than the last round.
+    Two estimates of time and state agree up to the tolerances and what the rounding of a landing hides: it is
+    magnified by the sum of the series and by the rounding of its ratio, but it hides no more than the last
+    round.
     """
     series = NO_SERIES
     if run.mode == run.previous_mode and model.marker[transition] == 0:
@@ -81,19 +81,16 @@ def known_limit(model, method, run, transition, work):
     impacts = series.turn > 0
     if not impacts:
         series = series_of_rounds(model, run)
-    n, turn, left, before = model.dimension, series.turn, series.left, run.trail[LIMIT]
-    misfit, misfit_before = still_changes(series) * abs(series.shift), run.trail[ENDLESS, n]
-    run.trail[ENDLESS, n] = misfit if turn > 0 else math.inf
+    turn, left, before = series.turn, series.left, run.trail[LIMIT]
     if turn == 0:
         return series
     # In the next round landings are slower, so that rounding moves them by more.
     # The length of a flight keeps the digits that a late time has lost; that of a round does not.
     time = measured_time(model, run, run.mode) if impacts else abs(run.phase)
     landing, next_round = rounding_of_landing(model, run, time, work), series.ratio**2 * series.latest
-    closer = misfit <= series.ratio ** (1.0 / turn) * misfit_before and landing < next_round
-    hidden = 0.0 if closer else min(landing / (1.0 - series.ratio) ** 2, series.latest)
+    hidden = min(landing / (1.0 - series.ratio) ** 2, series.latest)
     lasted = time_between(model, run, 0, min(series.jumps, run.visits.shape[0]) - 1)
-    if misfit > method.rtol * lasted + hidden:
+    if still_changes(series) * abs(series.shift) > method.rtol * lasted + hidden:
         before[0] = math.inf
         return NO_SERIES
     if impacts:
@@ -102,9 +99,9 @@ def known_limit(model, method, run, transition, work):
         extrapolate_rounds(model, run, turn, turn, before)
         extrapolate_rounds(model, run, turn, 0, work.settled)
         mark_endless(model, run, turn, run.phase + left, work.settled, work)
-        hold_endless(model, run, turn, left, work)
+        hold_endless(model, run, left, work)
     known = state_is_known(model, method, run, series, hidden, work)
-    for i in range(n):
+    for i in range(model.dimension):
         before[i] = work.settled[i]
     visible = left > RESOLVED * lasted and landing < RESOLVED * next_round
     if visible and series.jumps < fewest_jumps(turn):
@@ -288,7 +285,7 @@ def go_to_limit(task, series, transition):
     """
     _, model, method, run, record, work = task_of(task)
     n, tangents, turn, left = model.dimension, task.tangents, series.turn, series.left
-    alone = turn == 1 and run.chattering > 0 and left > 0.0
+    alone = turn == 1 and left > 0.0 and follows_impact(model, run)
     if not alone:
         land_on_guards(model, turn, run.phase + left, run, work)
     target, onward = mode_of_limit(model, run, transition, run.phase + left, work.settled, work)

@@ -11,7 +11,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.events.guards import guard_acceleration, guard_speed, guard_value, rounding_band
-from hybrid.kernels.jumps.past import fired_before
+from hybrid.kernels.jumps.past import fired_before, follows_impact
 from hybrid.kernels.limit.endless import mark_endless
 from hybrid.kernels.limit.rounds import NO_SERIES, Series, shortens
 from hybrid.kernels.types.codes import ENDLESS, IMPULSE, LIMIT
@@ -27,35 +27,29 @@ def far_side(model, run, transition):
 
 
 @njit(**KERNEL)
-def motion_behind(model, run, transition, work):
-    """Speed and acceleration of the guard right after an impact on it; 0 if the reset leaves the guard."""
-    mode, t, x = run.mode, run.phase, run.y
-    if run.clear == 1:
-        return run.speed_behind, run.acceleration_behind
-    model.field(mode, t, x, model.parameters, work.field)
-    speed = guard_speed(model, transition, t, x, work.field, work.gradient)
-    # No chatter begins with a reset that leaves the guard.
-    value = guard_value(model, transition, t, x, work.scalar)
-    if not abs(value) <= rounding_band(model, run, transition, t, x, work):
-        return 0.0, 0.0
-    return speed, guard_acceleration(model, run, transition, mode, t, x, work)
-
-
-@njit(**KERNEL)
 def series_of_impacts(model, run, transition, work):
     """The series of impacts on one guard, known once two have followed each other.
 
     The last columns of ``run.trail`` hold what the next impact compares with: the guard's speed and the time
     left.
     """
-    n, ratio, side = model.dimension, run.restitution, -far_side(model, run, transition)
+    n, ratio, side, t, x = (
+        model.dimension,
+        run.restitution,
+        -far_side(model, run, transition),
+        run.phase,
+        run.y,
+    )
     follows = run.chatter_jumps + 1 == run.jumps and fired_before(run, 1) == transition
     earlier, run.chattering = run.chattering if follows else 0, 0
-    if not 0.0 < ratio < 1.0 or (run.jumps > 2 and not shortens(model, run, 1)):
+    if not follows_impact(model, run) or (run.jumps > 2 and not shortens(model, run, 1)):
         return NO_SERIES
-    speed, acceleration = motion_behind(model, run, transition, work)
-    speed, pull = side * speed, -side * acceleration
-    if not (pull > 0.0 and speed > 0.0):
+    # No chatter begins with a reset that leaves the guard.
+    value = guard_value(model, transition, t, x, work.scalar)
+    model.field(run.mode, t, x, model.parameters, work.field)
+    speed = side * guard_speed(model, transition, t, x, work.field, work.gradient)
+    pull = -side * guard_acceleration(model, run, transition, run.mode, t, x, work)
+    if not (pull > 0.0 and speed > 0.0 and abs(value) <= rounding_band(model, run, transition, t, x, work)):
         return NO_SERIES
     span, before, flight = 2.0 * speed / (pull * (1.0 - ratio)), run.trail[LIMIT, n], run.stay[run.mode]
     run.trail[IMPULSE, n], run.trail[LIMIT, n], run.chatter_jumps = speed, span, run.jumps

@@ -70,6 +70,4 @@ NUMBERS = (
     "stretch_left",
     "entry_phase",
     "entry_low",
-    "speed_behind",
-    "acceleration_behind",
 )

@@ -240,9 +240,8 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
       The mode was entered in the period ``entry_cycle`` at ``entry_phase``, and ``entry_low`` of rounding.
       ``turned``: jumps at ticks that changed which transition of their clock may fire, last to ``turned_to``.
     - ``clear``: 1 if the last jump has left the state clear of all guards but its own, whose sides are in
-      ``tried_side``; after an impact, ``speed_behind`` and ``acceleration_behind`` are those of its guard,
-      or 0 if the reset has left the guard. ``distant``: 1 if the last step has proved that all guards are far
-      from zero at its end; ``crossings``: 1 if it has found one crossing, which is certain.
+      ``tried_side``. ``distant``: 1 if the last step has proved that all guards are far from zero at its end;
+      ``crossings``: 1 if it has found one crossing, which is certain.
     - ``horizon``: how long the run takes, 0 if that is not known at its start; ``longest_step`` in time so
       far; ``lateness``: the largest change that the rounding of the time made, in tolerances;
       ``unknown_time``: the largest error that the time of a jump may have where a guard came to rest, and the
