@@ -11,6 +11,9 @@ from hybrid.kernels.types.options import KERNEL
 # Share of a component's size over which a central difference is taken: the cube root of EPSILON makes its
 # errors by rounding and by curvature alike, about EPSILON to the power 2/3.
 NEARBY = EPSILON ** (1.0 / 3.0)
+# The share of a quantity that counts as nothing at a limit: of the time, what is left; of the state, how far
+# it may be from the guards, and how far the resets may move it. An extrapolation errs by its square.
+RESOLVED = 1e-6
 # Share of a number, or of the terms of a sum, that rounding may make up after a few operations.
 ROUNDED = 64.0 * EPSILON
 
@@ -46,28 +49,56 @@ def speed_gradient(model, run, transition, mode, t, x, out, work):
 
 
 @njit(**KERNEL)
+def dot(n, a, b):
+    """The product of two vectors ``(n,)``; zero if it may be rounding."""
+    total, terms = 0.0, 0.0
+    for i in range(n):
+        total += a[i] * b[i]
+        terms += abs(a[i] * b[i])
+    return total if abs(total) > ROUNDED * terms else 0.0
+
+
+@njit(**KERNEL)
+def project(n, rows, out):
+    """The projection ``I - V (G V)^-1 G`` into ``out (n, n)``; whether there is one.
+
+    The first two ``rows`` are the gradients ``G`` of what vanishes after it, the others the two ways in ``V``
+    along which it is taken out.
+    """
+    a, b = dot(n, rows[0], rows[2]), dot(n, rows[0], rows[3])
+    c, d = dot(n, rows[1], rows[2]), dot(n, rows[1], rows[3])
+    det = a * d - b * c
+    known = abs(det) > RESOLVED * (abs(a * d) + abs(b * c))
+    for j in range(n):
+        along = (d * rows[0, j] - b * rows[1, j]) / det if known else 0.0
+        across = (a * rows[1, j] - c * rows[0, j]) / det if known else 0.0
+        for i in range(n):
+            kept, one, other = 1.0 if i == j else 0.0, along * rows[2, i], across * rows[3, i]
+            left = kept - one - other
+            # What is rounding of the terms would look like a direction.
+            out[i, j] = left if abs(left) > ROUNDED * (kept + abs(one) + abs(other)) else 0.0
+    return known
+
+
+@njit(**KERNEL)
+def motion(model, mode, t, x, way, out, work):
+    """The motion ``D_x f d`` that a change ``d`` of the state brings in a mode, into ``out (n,)``."""
+    whole_jacobian(model, mode, t, x, work.jacobian)
+    for i in range(model.dimension):
+        out[i] = dot(model.dimension, work.jacobian[i], way)
+
+
+@njit(**KERNEL)
 def rest_matrix(model, run, transition, work):
     """Projection on the states that rest on the guard that has just fired, into ``work.saltation (n, n)``.
 
-    The speed is taken out along the impulse ``p`` and the height along ``D_x f p``, the motion it brings,
-    ``Xi = I - p (D_x v - (D_x v D_x f p) D_x g) - (D_x f p) D_x g`` with ``v`` the guard's speed. ``D_x v``
-    is left in ``work.error``, ``D_x f`` in ``work.jacobian``.
+    The speed and the height are taken out along the impulse ``p`` and the motion ``D_x f p`` that it brings.
+    The derivative of the speed is left in ``work.error``, ``D_x f`` in ``work.jacobian``.
     """
-    n, impulse = model.dimension, run.trail[IMPULSE]
-    slope, carried = work.error, work.second_error
-    speed_gradient(model, run, transition, run.mode, run.phase, run.y, slope, work)
-    model.guard_gradient(transition, run.phase, run.y, model.parameters, work.gradient)
-    coupling = 0.0
+    n, t, rows = model.dimension, run.phase, work.rounding
+    speed_gradient(model, run, transition, run.mode, t, run.y, work.error, work)
+    model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
     for i in range(n):
-        carried[i] = 0.0
-        for j in range(n):
-            carried[i] += work.jacobian[i, j] * impulse[j]
-        coupling += slope[i] * carried[i]
-    for i in range(n):
-        for j in range(n):
-            kept = 1.0 if i == j else 0.0
-            taken = impulse[i] * (slope[j] - coupling * work.gradient[j]) + carried[i] * work.gradient[j]
-            terms = abs(slope[j]) + abs(coupling * work.gradient[j])
-            terms = kept + abs(impulse[i]) * terms + abs(carried[i] * work.gradient[j])
-            # What is rounding of the terms would look like a direction.
-            work.saltation[i, j] = kept - taken if abs(kept - taken) > ROUNDED * terms else 0.0
+        rows[0, i], rows[1, i], rows[2, i] = work.gradient[i], work.error[i], run.trail[IMPULSE, i]
+    motion(model, run.mode, t, run.y, rows[2], rows[3], work)
+    project(n, rows, work.saltation)

@@ -9,8 +9,7 @@ instant, where all else is at rest, only guards and conditions could still make 
 from numba import njit
 
 from hybrid.kernels.jumps.past import fired_before, visit_before
-from hybrid.kernels.jumps.rest import ROUNDED
-from hybrid.kernels.limit.rounds import RESOLVED
+from hybrid.kernels.jumps.rest import RESOLVED, ROUNDED
 from hybrid.kernels.types.codes import BY_FLOW, BY_NOTHING, ENDLESS, HELD, NO_MODE
 from hybrid.kernels.types.options import KERNEL
 

@@ -26,14 +26,13 @@ from hybrid.kernels.jumps.jump import assume_sizes, carry_tangents, go_onward, m
 from hybrid.kernels.jumps.locked import begin_instant
 from hybrid.kernels.jumps.past import fired_before, follows_impact, time_between
 from hybrid.kernels.jumps.record import remember_flight, remember_jump
-from hybrid.kernels.jumps.rest import ROUNDED
+from hybrid.kernels.jumps.rest import RESOLVED, ROUNDED
 from hybrid.kernels.limit.endless import hold_endless, mark_endless, may_be_held
 from hybrid.kernels.limit.impacts import extrapolate_impacts, series_of_impacts
-from hybrid.kernels.limit.meeting import is_close_to_limit, may_be_mapped, meeting_matrix
+from hybrid.kernels.limit.meeting import hides_next_round, may_be_mapped, meeting_matrix
 from hybrid.kernels.limit.rounds import (
     FEWEST_JUMPS,
     NO_SERIES,
-    RESOLVED,
     Series,
     extrapolate_rounds,
     fewest_jumps,
@@ -293,7 +292,7 @@ def go_to_limit(task, series, transition):
         return False
     named = model.accumulates_to[transition] != NO_MODE
     mapped = tangents > 0 and named and may_be_mapped(model, run, turn)
-    if mapped and left > 0.0 and not is_close_to_limit(model, method, run, series, work):
+    if mapped and left > 0.0 and not hides_next_round(model, method, run, series, work):
         return False
     if not may_be_held(model, run, turn, left):
         return False

@@ -11,11 +11,10 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.slopes import whole_jacobian
-from hybrid.kernels.events.guards import error_band, guard_acceleration, guard_speed, guard_value
+from hybrid.kernels.events.guards import error_band, guard_acceleration
 from hybrid.kernels.jumps.past import fired_before
-from hybrid.kernels.jumps.rest import ROUNDED
-from hybrid.kernels.limit.rounds import RESOLVED, rounding_of_landing
+from hybrid.kernels.jumps.rest import RESOLVED, ROUNDED, motion, project
+from hybrid.kernels.limit.rounds import rounding_of_landing
 from hybrid.kernels.types.codes import NO_TRANSITION
 from hybrid.kernels.types.options import KERNEL
 
@@ -57,86 +56,45 @@ def difference(model, mode, target, t, x, out, work):
 
 
 @njit(**KERNEL)
-def dot(n, a, b):
-    """The product of two vectors ``(n,)``; zero if it may be rounding."""
-    total, terms = 0.0, 0.0
+def leaves(n, matrix, x):
+    """Whether a projection leaves a part of ``x (n,)``."""
     for i in range(n):
-        total += a[i] * b[i]
-        terms += abs(a[i] * b[i])
-    return total if abs(total) > ROUNDED * terms else 0.0
+        total, terms = 0.0, 0.0
+        for j in range(n):
+            total += matrix[i, j] * x[j]
+            terms += abs(matrix[i, j] * x[j])
+        if abs(total) > RESOLVED * terms:
+            return True
+    return False
 
 
 @njit(**KERNEL)
-def determinant(n, normals, ways):
-    """Determinant of the rates of two guards along two ways; zero if it may be rounding."""
-    one = dot(n, normals[0], ways[0]) * dot(n, normals[1], ways[1])
-    other = dot(n, normals[0], ways[1]) * dot(n, normals[1], ways[0])
-    return one - other if abs(one - other) > RESOLVED * (abs(one) + abs(other)) else 0.0
+def find_ways(model, run, turn, target, t, x, work):
+    """Project along the ways of a round that comes to the meeting ``x (n,)``, into ``work.saltation``.
 
-
-@njit(**KERNEL)
-def take_out(n, normals, ways, det, x):
-    """Move ``x (n,)`` along two ways to where two guards vanish."""
-    a, b = dot(n, normals[0], x), dot(n, normals[1], x)
-    along = (a * dot(n, normals[1], ways[1]) - b * dot(n, normals[0], ways[1])) / det
-    across = (b * dot(n, normals[0], ways[0]) - a * dot(n, normals[1], ways[0])) / det
+    Returns whether all modes of the round lead along two ways.
+    """
+    n, rows, change, found = model.dimension, work.rounding, work.new, False
     for i in range(n):
-        left = x[i] - along * ways[0, i] - across * ways[1, i]
-        terms = abs(x[i]) + abs(along * ways[0, i]) + abs(across * ways[1, i])
-        # What is rounding of the terms would look like a direction.
-        x[i] = left if abs(left) > ROUNDED * terms else 0.0
-
-
-@njit(**KERNEL)
-def is_within(n, normals, ways, det, x, out):
-    """Whether ``x (n,)`` is a combination of two ways."""
-    for i in range(n):
-        out[i] = x[i]
-    take_out(n, normals, ways, det, out)
-    within = True
-    for i in range(n):
-        within = within and abs(out[i]) <= RESOLVED * (abs(x[i]) + abs(ways[0, i]) + abs(ways[1, i]))
-    return within
-
-
-@njit(**KERNEL)
-def motion(model, mode, t, x, way, out, work):
-    """The motion ``D_x f d`` that a change ``d`` of the state brings in a mode, into ``out (n,)``."""
-    whole_jacobian(model, mode, t, x, work.jacobian)
-    for i in range(model.dimension):
-        out[i] = dot(model.dimension, work.jacobian[i], way)
-
-
-@njit(**KERNEL)
-def find_ways(model, run, turn, target, t, x, normals, ways, work):
-    """The two ways along which a round comes to the meeting ``x (n,)``; their determinant, zero for none."""
-    n, change, rest, det = model.dimension, work.new, work.error, 0.0
-    found = 0
+        rows[2, i] = 0.0
     for back in range(turn):
-        mode = model.target[fired_before(run, back)]
-        difference(model, mode, target, t, x, change, work)
-        moves = dot(n, normals[0], change) != 0.0 or dot(n, normals[1], change) != 0.0
-        if det == 0.0 and moves:
-            for i in range(n):
-                ways[found, i] = change[i]
-            det = determinant(n, normals, ways) if found == 1 else 0.0
-            found = 1
-    tied = found == 1 and det == 0.0
+        if not found:
+            difference(model, model.target[fired_before(run, back)], target, t, x, rows[3], work)
+            found = project(n, rows, work.saltation)
+        for i in range(n if not found else 0):
+            rows[2, i] = rows[3, i]
+    tied = not found
     if tied:
-        motion(model, target, t, x, ways[0], ways[1], work)
-        det = determinant(n, normals, ways)
-    if det == 0.0:
-        return 0.0
-    for back in range(turn):
+        motion(model, target, t, x, rows[2], rows[3], work)
+        found = project(n, rows, work.saltation)
+    for back in range(turn if found else 0):
         mode = model.target[fired_before(run, back)]
         difference(model, mode, target, t, x, change, work)
-        if not is_within(n, normals, ways, det, change, rest):
-            return 0.0
+        found = found and not leaves(n, work.saltation, change)
         if tied:
-            motion(model, mode, t, x, ways[0], change, work)
-            if not is_within(n, normals, ways, det, change, rest):
-                return 0.0
-    return det
+            motion(model, mode, t, x, rows[2], change, work)
+            found = found and not leaves(n, work.saltation, change)
+    return found
 
 
 @njit(**KERNEL)
@@ -146,26 +104,17 @@ def may_be_mapped(model, run, turn):
 
 
 @njit(**KERNEL)
-def is_close_to_limit(model, method, run, series, work):
-    """Whether the tolerances hide how far the next round moves a guard, or rounding begins to hide it.
+def hides_next_round(model, method, run, series, work):
+    """Whether the tolerances hide how far the next round leads beyond the last guard, or rounding its time.
 
     What the jumps to come do to tangent vectors besides the map of the meeting fades with the time left.
     """
-    landing = rounding_of_landing(model, run, abs(run.phase), work)
-    if landing >= RESOLVED * series.ratio**2 * series.latest:
+    if rounding_of_landing(model, run, abs(run.phase), work) >= RESOLVED * series.ratio**2 * series.latest:
         return True
-    t, x = run.phase, run.y
-    for transition in (fired_before(run, 0), meets_another(model, run, series.turn)):
-        height = abs(guard_value(model, transition, t, x, work.scalar))
-        model.field(run.mode, t, x, model.parameters, work.field)
-        speed = guard_speed(model, transition, t, x, work.field, work.gradient)
-        acceleration = abs(guard_acceleration(model, run, transition, run.mode, t, x, work))
-        if acceleration > 0.0:
-            height += speed**2 / (2.0 * acceleration)
-            model.guard_gradient(transition, t, x, model.parameters, work.gradient)
-            if height * series.ratio**2 <= error_band(method, run, work.gradient, model.controlled):
-                return True
-    return False
+    model.field(run.mode, run.phase, run.y, model.parameters, work.field)
+    acceleration = guard_acceleration(model, run, run.last_fired, run.mode, run.phase, run.y, work)
+    band = error_band(method, run, work.gradient, model.controlled)
+    return (series.ratio * run.last_transversality) ** 2 <= 2.0 * abs(acceleration) * band
 
 
 @njit(**KERNEL)
@@ -174,7 +123,7 @@ def meeting_matrix(model, run, turn, target, left, work):
 
     The derivative of the instant of the limit is not: ``run.instant`` becomes nan.
     """
-    n, t, x, normals, ways = model.dimension, run.phase + left, work.settled, work.rounding, work.sizes
+    n, t, x, way, onward = model.dimension, run.phase + left, work.settled, work.new, work.error
     pair = fired_before(run, 0), meets_another(model, run, turn)
     for back in range(turn):
         if not keeps_state(model, fired_before(run, back), t, x, work):
@@ -182,17 +131,14 @@ def meeting_matrix(model, run, turn, target, left, work):
     for k in range(2):
         model.guard_gradient(pair[k], t, x, model.parameters, work.gradient)
         for i in range(n):
-            normals[k, i] = work.gradient[i]
-    det = find_ways(model, run, turn, target, t, x, normals, ways, work)
-    if det == 0.0:
+            work.rounding[k, i] = work.gradient[i]
+    if not find_ways(model, run, turn, target, t, x, work):
         return False
-    column, onward = work.new, work.error
     for j in range(n):
         for i in range(n):
-            column[i] = 1.0 if i == j else 0.0
-        take_out(n, normals, ways, det, column)
-        motion(model, target, t, x, column, onward, work)
+            way[i] = work.saltation[i, j]
+        motion(model, target, t, x, way, onward, work)
         for i in range(n):
-            work.saltation[i, j] = column[i] + left * onward[i]
+            work.saltation[i, j] += left * onward[i]
         run.instant[j] = math.nan
     return True

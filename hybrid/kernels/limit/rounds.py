@@ -11,6 +11,7 @@ from numba import njit
 
 from hybrid.kernels.events.guards import rounding_band, size_of_time
 from hybrid.kernels.jumps.past import fired_before, time_between, visit_before
+from hybrid.kernels.jumps.rest import RESOLVED
 from hybrid.kernels.types.codes import ENDLESS, LIMIT
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
@@ -22,9 +23,6 @@ FEWEST_JUMPS = 16
 # The ratio of the rounds may change from one to the next by this share of its distance from 1. The series is
 # then summed up to about this share, and the agreement of two sums is left to judge.
 STEADY = 0.1
-# The share of a quantity that counts as nothing at a limit: of the time, what is left; of the state, how far
-# it may be from the guards, and how far the resets may move it. An extrapolation errs by its square.
-RESOLVED = 1e-6
 # The share of a time by which rounding moves the time between two jumps.
 HIDDEN_IN_TIME = 4.0 * EPSILON
 
