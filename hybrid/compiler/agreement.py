@@ -13,7 +13,7 @@ from hybrid.expression.pieces import Pieces
 from hybrid.expression.values import TraceError, values_of
 from hybrid.expression.vocabulary import WHERE, named
 from hybrid.system.derivatives import complex_step, evaluate, sample_points
-from hybrid.system.functions import CONDITION, ModelFunction
+from hybrid.system.functions import CONDITION, GUARD, ModelFunction
 from hybrid.system.graph import HybridSystem, functions_of
 
 EPSILON = float(np.finfo(float).eps)
@@ -119,7 +119,8 @@ def disagreement(
     system = compiled.system
     found = value(compiled, function, index, t, x, values)
     opaque = _is_opaque(compiled, function.function)
-    text = _difference(system, function.title, function.value, found, t, x, values, opaque)
+    signs = function.kind == GUARD and not opaque
+    text = _difference(system, function.title, function.value, found, t, x, values, opaque, signs)
     if text is not None or function.kind == CONDITION:
         return text
     if function.slopes is not None:
@@ -163,9 +164,13 @@ def _difference(
     x: np.ndarray,
     values: np.ndarray,
     opaque: bool,
+    signs: bool = False,
 ) -> str | None:
+    """How a value differs from Python's; of a guard that is traced, only its sign (``plain``)."""
     wanted = evaluate(system.variables, function, t, x, values)
     if wanted is None or len(wanted) != len(found):
+        return None
+    if signs and np.all(np.sign(found) == np.sign(wanted)):
         return None
     apart = np.abs(found - wanted)
     if np.all(apart <= SAME_VALUE * np.abs(wanted)):

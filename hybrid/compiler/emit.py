@@ -51,6 +51,7 @@ from hybrid.expression.graph import forget, nodes_of
 from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol
 from hybrid.expression.operations import JUMPING
 from hybrid.expression.periodicity import is_periodic
+from hybrid.expression.plain import plain
 from hybrid.expression.signs import simplified
 from hybrid.expression.tabulated import Tabulated
 from hybrid.expression.tracing import Symbols, TraceError, model_symbols
@@ -58,6 +59,7 @@ from hybrid.system.checks import derivative_has_time_column
 from hybrid.system.derivatives import complex_step_error
 from hybrid.system.functions import (
     CONDITION,
+    GUARD,
     ModelFunction,
     condition_function,
     field_function,
@@ -290,6 +292,8 @@ class _Writer:
         targets = [at("out", i) for i in range(function.size or 1)]
         try:
             expressions = self.traced(function)
+            if function.kind == GUARD and function.derivative is None:
+                expressions = [plain(each) for each in expressions]
             jacobian = jacobian_of(expressions[: function.kept], self.symbols.variables)
             memory = function.memory_rows(self.system.dimension + 1)
             jacobian += [[ONE if entry else ZERO for entry in row] for row in memory]

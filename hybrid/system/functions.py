@@ -13,6 +13,7 @@ from hybrid.system.labels import plain_name
 from hybrid.system.variables import STATE, Variables
 
 CONDITION = "when"
+GUARD = "guard"
 CLOCK = "clock"
 
 
@@ -202,7 +203,7 @@ def guard_function(transition: Transition) -> ModelFunction:
     """The guard of a transition; of a clock, the time since its nearest tick."""
     guard = transition.guard
     owner = f"Transition {transition.name!r}"
-    kind = "guard" if transition.clock is None else CLOCK
+    kind = GUARD if transition.clock is None else CLOCK
     return ModelFunction(owner, kind, guard.function, "gradient", guard.gradient, None)
 
 

@@ -25,7 +25,6 @@ from hybrid.kernels.events.moments import (
     speed_rounding,
 )
 from hybrid.kernels.events.onset import AT_REST, BY_SPEED, LATER
-from hybrid.kernels.events.surface import finds_surface
 from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION, RESTING
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -196,9 +195,6 @@ def is_held(model, run, place, transition, towards, work):
     move_for(model, mode, t, x, 2.0 * moment, later, work)
     model.field(mode, end, later, model.parameters, work.field)
     speed = guard_speed(model, transition, end, later, work.field, work.gradient) * towards
-    way = float(towards)
-    if finds_surface(model, transition, end, later, speed, work):
-        speed, way = 1.0, 1.0
     model.reset(transition, end, later, model.parameters, work.state)
     model.field(mode, end, work.state, model.parameters, work.field_after)
     kept = work.gradient[model.dimension]
@@ -206,7 +202,7 @@ def is_held(model, run, place, transition, towards, work):
         kept += work.gradient[i] * work.field_after[i]
     model.field(mode, t, x, model.parameters, work.field)
     # Without products of speeds, which may be too small for a number.
-    return speed > 0.0 and not kept * way > KEPT_BY_RESET * speed
+    return speed > 0.0 and not kept * towards > KEPT_BY_RESET * speed
 
 
 @njit(**KERNEL)

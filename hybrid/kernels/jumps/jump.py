@@ -18,7 +18,7 @@ from hybrid.kernels.events.guards import (
     guard_speed,
 )
 from hybrid.kernels.events.sides import mode_of_limit
-from hybrid.kernels.events.surface import finds_surface
+from hybrid.kernels.events.surface import jumps_across
 from hybrid.kernels.jumps.locked import (
     begin_at_start,
     begin_instant,
@@ -80,16 +80,13 @@ def saltation(model, transition, t, x_minus, x_plus, work):
 
     ``Xi = D_x R + (f_plus - D_x R f_minus - D_t R) D_x g / (D_t g + D_x g f_minus)``, with all time terms
     (Kong, Payne, Zhu and Johnson 2024, arXiv:2306.06862). Returns the transversality, the denominator. Where
-    that is zero the matrix holds ``D_x R`` alone if the fields agree, else infinities; but a guard may have a
-    surface that its gradient does not show: then this is its matrix. The sizes of the terms of each entry go
-    to ``work.sizes``.
+    that is zero, or the guard jumps, the matrix holds ``D_x R`` alone if the fields agree, else infinities.
+    The sizes of the terms of each entry go to ``work.sizes``.
     """
     n = model.dimension
     before, behind = model.field_before[transition], model.field_behind[transition]
     transversality = cross(model, transition, before, behind, t, x_minus, x_plus, work)
-    speed = transversality
-    if finds_surface(model, transition, t, x_minus, transversality, work):
-        speed = 1.0
+    jumps = jumps_across(model, transition, t, x_minus, work)
     for i in range(n):
         terms = abs(work.field_after[i]) + abs(work.reset_jacobian[i, n])
         for j in range(n):
@@ -98,9 +95,9 @@ def saltation(model, transition, t, x_minus, x_plus, work):
             work.saltation[i, j] = work.reset_jacobian[i, j]
             work.sizes[i, j] = abs(work.reset_jacobian[i, j])
             term = work.settled[i] * work.gradient[j]
-            if term != 0.0:
-                work.saltation[i, j] += term / speed
-                work.sizes[i, j] += abs(terms * work.gradient[j] / speed)
+            if term != 0.0 or (jumps and work.settled[i] != 0.0):
+                work.saltation[i, j] += math.inf if jumps else term / transversality
+                work.sizes[i, j] += abs(terms * work.gradient[j] / transversality)
     return transversality
 
 
@@ -179,7 +176,7 @@ def is_grazing(model, method, run, transition, transversality, work):
     acceleration = guard_acceleration(model, run, transition, run.mode, run.phase, run.y, work)
     band = error_band(method, run, work.gradient, model.controlled)
     if transversality * transversality <= 2.0 * abs(acceleration) * band:
-        return not finds_surface(model, transition, run.phase, run.y, transversality, work)
+        return not jumps_across(model, transition, run.phase, run.y, work)
     # Inside such a dip the steps are as short as the dip, and so are the sizes that the tolerances refer to.
     way_in = run.last_transversality
     grazed = run.last_kind == GRAZING and run.last_fired == transition

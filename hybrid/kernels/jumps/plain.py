@@ -19,7 +19,7 @@ from hybrid.kernels.events.guards import (
 )
 from hybrid.kernels.events.moments import speed_rounding
 from hybrid.kernels.events.onset import BY_SPEED
-from hybrid.kernels.events.surface import finds_surface
+from hybrid.kernels.events.surface import jumps_across
 from hybrid.kernels.jumps.jump import ends_own_flight, is_grazing, judge, move
 from hybrid.kernels.jumps.locked import postpone_map
 from hybrid.kernels.jumps.past import impulse_of
@@ -245,7 +245,7 @@ def jump_plainly(task, fired):
     asked = tangents > 0 or record.jump_phase.shape[0] > 0
     matrix, distortion = NO_MATRIX, 0.0
     if tangents > 0:
-        if model.affine_guard[fired] == 0 and finds_surface(model, fired, t, run.y, transversality, work):
+        if jumps_across(model, fired, t, run.y, work):
             return False
         if keeps:
             matrix = shear_of(model, transversality, work)
