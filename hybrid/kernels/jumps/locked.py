@@ -52,16 +52,6 @@ def change_of_instant(run, n, work):
 
 
 @njit(**KERNEL)
-def begin_instant(run, n, tangents, work):
-    """Store the tangent vectors and the tangent map ``work.saltation`` of a jump that begins an instant.
-
-    ``change_of_instant`` has been called.
-    """
-    keep_tangents(run, n, tangents)
-    keep_map(run, n, work)
-
-
-@njit(**KERNEL)
 def keep_map(run, n, work):
     """Store ``work.saltation`` as the tangent map of this instant so far."""
     for j in range(n):
@@ -80,7 +70,7 @@ def postpone_map(run, n):
 
 @njit(**KERNEL)
 def begin_at_start(run, n, tangents):
-    """As ``begin_instant``, for a run that starts beyond a guard."""
+    """Begin an instant in which a run starts beyond a guard: nothing has changed yet."""
     keep_tangents(run, n, tangents)
     for i in range(n * (1 + n)):
         run.instant[i] = 0.0

@@ -10,7 +10,7 @@ from numba import njit
 
 from hybrid.kernels.jumps.past import fired_before, visit_before
 from hybrid.kernels.jumps.rest import RESOLVED, ROUNDED
-from hybrid.kernels.types.codes import BY_FLOW, BY_NOTHING, ENDLESS, HELD, NO_MODE
+from hybrid.kernels.types.codes import BY_FLOW, BY_NOTHING, ENDLESS, HELD, IMPULSE, NO_MODE
 from hybrid.kernels.types.options import KERNEL
 
 # A component is moved at the limit if a round moves it by this share of what the last round did: one that has
@@ -19,47 +19,30 @@ MOVES_ON = 0.1
 
 
 @njit(**KERNEL)
-def follow_resets(model, run, turn, t, x, work):
-    """The resets of the last ``turn`` jumps, in order, from ``x (n,)`` into ``x``."""
-    for back in range(turn - 1, -1, -1):
-        model.reset(fired_before(run, back), t, x, model.parameters, work.state)
-        for i in range(model.dimension):
-            x[i] = work.state[i]
+def hold_endless(model, run, turn, left, work):
+    """Find what rounds of ``turn`` jumps move for ever, though all else rests at the limit ``work.settled``.
 
-
-@njit(**KERNEL)
-def mark_endless(model, run, turn, t, x, work):
-    """Mark the components that rounds of ``turn`` jumps move for ever, though all others rest at ``x (n,)``.
-
-    A second round moves them as far as the first: a component whose moves shrink has a limit of its own.
+    These components are marked. They keep their last values but for their own rate, and have no impulse.
     """
-    n, once, twice = model.dimension, work.second_error, work.new
+    n, t, x, once, after = model.dimension, run.phase + left, work.second_error, work.new, work.state
     last, before = run.visits[visit_before(run, 0)], run.visits[visit_before(run, turn)]
-    found = False
     for i in range(n):
-        once[i] = x[i]
-    follow_resets(model, run, turn, t, once, work)
+        x[i] = work.settled[i]
+    for back in range(2 * turn - 1, -1, -1):
+        model.reset(fired_before(run, back % turn), t, x, model.parameters, after)
+        for i in range(n):
+            x[i] = after[i]
+        for i in range(n if back == turn else 0):
+            once[i] = x[i]
+    model.field(run.mode, run.phase, run.y, model.parameters, work.field)
     for i in range(n):
         least = max(MOVES_ON * abs(last[i] - before[i]), ROUNDED * run.scale[i])
-        moves = abs(once[i] - x[i]) > least
-        run.trail[ENDLESS, i] = 1.0 if moves else 0.0
-        twice[i] = once[i] if moves else x[i]
-        found = found or moves
-    if not found:
-        return
-    follow_resets(model, run, turn, t, twice, work)
-    for i in range(n):
-        if abs(twice[i] - once[i]) < (1.0 - RESOLVED) * abs(once[i] - x[i]):
-            run.trail[ENDLESS, i] = 0.0
-
-
-@njit(**KERNEL)
-def hold_endless(model, run, left, work):
-    """Let the marked components keep their last values in ``work.settled (n,)``, but for their own rate."""
-    model.field(run.mode, run.phase, run.y, model.parameters, work.field)
-    for i in range(model.dimension):
+        first, second = abs(once[i] - work.settled[i]), abs(x[i] - once[i])
+        # A component whose moves shrink has a limit of its own.
+        endless = first > least and second >= (1.0 - RESOLVED) * first
+        run.trail[ENDLESS, i] = 1.0 if endless else 0.0
         if run.trail[ENDLESS, i] != 0.0:
-            work.settled[i] = run.y[i] + left * work.field[i]
+            run.trail[IMPULSE, i], work.settled[i] = 0.0, run.y[i] + left * work.field[i]
 
 
 @njit(**KERNEL)

@@ -23,11 +23,11 @@ from hybrid.kernels.events.sides import mode_of_limit
 from hybrid.kernels.guards.isolate import first_change
 from hybrid.kernels.guards.pieces import NO_COLUMN, NOWHERE, Guard
 from hybrid.kernels.jumps.jump import assume_sizes, carry_tangents, go_onward, move
-from hybrid.kernels.jumps.locked import begin_instant
+from hybrid.kernels.jumps.locked import keep_map, keep_tangents
 from hybrid.kernels.jumps.past import fired_before, follows_impact, time_between
 from hybrid.kernels.jumps.record import remember_flight, remember_jump
 from hybrid.kernels.jumps.rest import RESOLVED, ROUNDED
-from hybrid.kernels.limit.endless import hold_endless, mark_endless, may_be_held
+from hybrid.kernels.limit.endless import hold_endless, may_be_held
 from hybrid.kernels.limit.impacts import extrapolate_impacts, series_of_impacts
 from hybrid.kernels.limit.meeting import hides_next_round, may_be_mapped, meeting_matrix
 from hybrid.kernels.limit.rounds import (
@@ -97,8 +97,7 @@ def known_limit(model, method, run, transition, work):
     else:
         extrapolate_rounds(model, run, turn, turn, before)
         extrapolate_rounds(model, run, turn, 0, work.settled)
-        mark_endless(model, run, turn, run.phase + left, work.settled, work)
-        hold_endless(model, run, left, work)
+    hold_endless(model, run, turn, left, work)
     known = state_is_known(model, method, run, series, hidden, work)
     for i in range(model.dimension):
         before[i] = work.settled[i]
@@ -131,7 +130,7 @@ def series_at_rest(model, run, work):
     for i in range(model.dimension):
         work.settled[i] = run.y[i]
         sizes[i] += clock * abs(work.field[i])
-    mark_endless(model, run, turn, run.phase, work.settled, work)
+    hold_endless(model, run, turn, 0.0, work)
     return Series(turn, run.jumps_here, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -302,7 +301,8 @@ def go_to_limit(task, series, transition):
         forget_tangents(task)
     if left > 0.0:
         remember_flight(run, record, n, left, work.settled)
-    begin_instant(run, n, tangents, work)
+    keep_tangents(run, n, tangents)
+    keep_map(run, n, work)
     forward(run, model.period, left)
     remember_jump(run, record, transition, 0.0, LIMIT_OF_CHATTER, True, work.settled, work)
     if tangents > 0:

@@ -12,9 +12,8 @@ from numba import njit
 
 from hybrid.kernels.events.guards import guard_acceleration, guard_speed, guard_value, rounding_band
 from hybrid.kernels.jumps.past import fired_before, follows_impact
-from hybrid.kernels.limit.endless import mark_endless
 from hybrid.kernels.limit.rounds import NO_SERIES, Series, shortens
-from hybrid.kernels.types.codes import ENDLESS, IMPULSE, LIMIT
+from hybrid.kernels.types.codes import IMPULSE, LIMIT
 from hybrid.kernels.types.options import KERNEL
 
 
@@ -103,17 +102,12 @@ def follow_mean(model, run, transition, start, span, moved, work):
 def extrapolate_impacts(model, run, transition, span, work):
     """Limit of the state into ``work.settled (n,)``: its speed taken out, then along the mean field until it.
 
-    The error is of third order in the speed where pull and impulse are constant. Components that the impacts
-    move for ever keep the value after the last impact.
+    The error is of third order in the speed where pull and impulse are constant.
     """
     n, start = model.dimension, work.trial
     speed = -far_side(model, run, transition) * run.trail[IMPULSE, n]
     for i in range(n):
         start[i] = run.y[i] - speed * run.trail[IMPULSE, i]
-    mark_endless(model, run, 1, run.phase, start, work)
-    for i in range(n):
-        if run.trail[ENDLESS, i] != 0.0:
-            run.trail[IMPULSE, i], start[i] = 0.0, run.y[i]
     follow_mean(model, run, transition, start, span, work.settled, work)
     for i in range(n):
         work.settled[i] += start[i]
