@@ -21,27 +21,21 @@ from hybrid.kernels.types.options import KERNEL
 
 @njit(**KERNEL)
 def meets_another(model, run, turn):
-    """A transition of the last ``turn`` jumps with another guard than the last; none for a third guard."""
+    """A transition of the last ``turn`` jumps with another guard than the last.
+
+    There is none if there are three guards, or if a jump changes the state.
+    """
     first, other = fired_before(run, 0), NO_TRANSITION
-    for back in range(1, turn):
+    for back in range(turn):
         fired = fired_before(run, back)
+        if model.keeps_state[fired] == 0:
+            return NO_TRANSITION
         if model.surface[fired] == model.surface[first]:
             continue
         if other != NO_TRANSITION and model.surface[fired] != model.surface[other]:
             return NO_TRANSITION
         other = fired
     return other
-
-
-@njit(**KERNEL)
-def keeps_state(model, transition, t, x, work):
-    """Whether a transition has no reset, to first order at ``x (n,)``."""
-    model.reset_jacobian(transition, t, x, model.parameters, work.reset_jacobian)
-    for i in range(model.dimension):
-        for j in range(model.dimension):
-            if work.reset_jacobian[i, j] != (1.0 if i == j else 0.0):
-                return False
-    return True
 
 
 @njit(**KERNEL)
@@ -125,9 +119,6 @@ def meeting_matrix(model, run, turn, target, left, work):
     """
     n, t, x, way, onward = model.dimension, run.phase + left, work.settled, work.new, work.error
     pair = fired_before(run, 0), meets_another(model, run, turn)
-    for back in range(turn):
-        if not keeps_state(model, fired_before(run, back), t, x, work):
-            return False
     for k in range(2):
         model.guard_gradient(pair[k], t, x, model.parameters, work.gradient)
         for i in range(n):
