@@ -10,7 +10,6 @@ from hybrid.kernels.events.guards import (
     error_band,
     guard_speed,
     guard_value,
-    has_program,
     may_jump,
     rounding_band,
     was_left_behind,
@@ -22,7 +21,6 @@ from hybrid.kernels.events.moments import (
     sign_along,
     sign_at_speed,
     sign_of_speed,
-    speed_rounding,
 )
 from hybrid.kernels.events.onset import AT_REST, BY_SPEED, LATER
 from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION, RESTING
@@ -153,13 +151,6 @@ def side_of(model, method, run, place, transition, came, before, work):
 
 
 @njit(**KERNEL)
-def order_passed(model, transition):
-    """How a guard that has been crossed and is not small counts: one that is bounded has jumped."""
-    by_bounds = has_program(model, transition) and model.guard_in_series[transition] == 0
-    return LATER if by_bounds else BY_SPEED
-
-
-@njit(**KERNEL)
 def crossed_by_landing(model, transition, known, own, before, now, order):
     """Whether a reset has taken a guard from its near side to its far side.
 
@@ -206,19 +197,6 @@ def is_held(model, run, place, transition, towards, work):
 
 
 @njit(**KERNEL)
-def crosses_slowly(model, run, place, transition, work):
-    """Whether the jump that led here has crossed its guard with no more speed than rounding makes.
-
-    The speed of a guard that may jump says nothing.
-    """
-    mode, t, x = place
-    if may_jump(model, run, transition, t, x, work):
-        return False
-    guard_speed(model, transition, t, x, work.field, work.gradient)
-    return abs(run.last_transversality) <= speed_rounding(model, run, transition, mode, t, x, work)
-
-
-@njit(**KERNEL)
 def side_here(model, method, run, place, transition, came, before, own, work):
     """``side_of`` a guard, where one that a coarser rounding let fire early is not taken for crossed."""
     _, t, x = place
@@ -238,22 +216,6 @@ def is_back_soon(model, run, place, transition, now, work):
     moment = LANDED_BY * moment_of_rounding(model, run, t, work)
     move_for(model, mode, t, x, moment, work.settled, work)
     return guard_value(model, transition, t + moment, work.settled, work.scalar) * now < 0.0
-
-
-@njit(**KERNEL)
-def crossed_by_flow(model, run, place, transition, before, now, order, work):
-    """Whether the flow has taken a guard across zero here; with how it has left zero.
-
-    Where the side before is not known, that a moment before counts.
-    """
-    direction, side = model.direction[transition], before.side
-    if side == 0 and order == LATER:
-        side, _, _ = sign_along(model, run, transition, place, -1.0, work)
-    crossed = order != AT_REST and side == -now and (direction == 0 or now == direction)
-    if crossed and order == 0:
-        # The step to another guard has passed this one by more than rounding.
-        order = order_passed(model, transition)
-    return crossed, order
 
 
 @njit(**KERNEL)
@@ -283,13 +245,14 @@ def take_side(model, method, run, place, transition, arrival, known_sides, work)
             order = LATER
     if own and order == AT_REST and direction != 0:
         # Its own reset has stopped the state on the guard, as a plastic impact does.
-        passes = before.order > 0 and crosses_slowly(model, run, place, transition, work)
-        now = before.side if passes else -direction
+        now = -direction
     due, rests = known_sides.due[transition] == 1, False
     if came == STARTED:
         crossed = order > 0 and direction != 0 and now == direction
     elif came == FLOWED:
-        crossed, order = crossed_by_flow(model, run, place, transition, before, now, order, work)
+        crossed = order != AT_REST and before.side == -now and direction in (0, now)
+        # The step to another guard may have passed this one by more than rounding.
+        order = BY_SPEED if crossed and order == 0 else order
     else:
         crossed = crossed_by_landing(model, transition, known, own, before, now, order)
         # A guard that fires both ways and was due already: this crossing takes the first one back.
@@ -311,9 +274,7 @@ def take_side(model, method, run, place, transition, arrival, known_sides, work)
         # together with the first jump, and has not been stopped there.
         stopped = order == AT_REST and before.order != AT_REST
         crossed, pending = False, pending and before.order > 0 and order > 0 and not stopped
-    # A marker that a run starts on has crossed nothing, whichever side the next step shows.
-    unknown = model.marker[transition] == 1 and came == STARTED and order == AT_REST
-    known_sides.side[transition], known_sides.zero[transition] = 0 if unknown else now, order
+    known_sides.side[transition], known_sides.zero[transition] = now, order
     known_sides.due[transition] = 1 if crossed or pending else 0
     return rests
 

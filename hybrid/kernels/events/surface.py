@@ -7,9 +7,9 @@ from hybrid.kernels.types.options import KERNEL
 
 # A guard is looked at so far before and behind its crossing, as a share of the time in which the state
 # changes by its size: the square root of rounding is what bends least and is rounded least.
-BESIDE = 1e-7
+BESIDE_CROSSING = 1e-7
 # A guard jumps if it changes by so many times what its speeds there explain: a smooth one changes by half.
-UNEXPLAINED = 1e3
+UNEXPLAINED_JUMP = 1e3
 
 
 @njit(**KERNEL)
@@ -30,7 +30,7 @@ def jumps_across(model, transition, t, x, work):
     """
     if model.affine_guard[transition] == 1:
         return False
-    s, before, behind, explained = BESIDE * unit_of_path(model, x, work), 0.0, 0.0, 0.0
+    s, before, behind, explained = BESIDE_CROSSING * unit_of_path(model, x, work), 0.0, 0.0, 0.0
     for way in (-1.0, 1.0):
         for i in range(model.dimension):
             work.state[i] = x[i] + way * s * work.field[i]
@@ -39,4 +39,4 @@ def jumps_across(model, transition, t, x, work):
             guard_speed(model, transition, t + way * s, work.state, work.field, work.gradient)
         )
     model.guard_gradient(transition, t, x, model.parameters, work.gradient)
-    return before * behind < 0.0 and abs(behind - before) > UNEXPLAINED * explained
+    return before * behind < 0.0 and abs(behind - before) > UNEXPLAINED_JUMP * explained

@@ -24,7 +24,6 @@ from hybrid.kernels.events.sides import (
     beyond_at_start,
     end_instant,
     listed_behind,
-    order_passed,
     side_here,
     sides_of,
     take_sides,
@@ -235,7 +234,7 @@ def first_in_order(task, fired, stop_cycle, stop_phase):
     touched = has_only_touched(model, run, record, fired, beyond, work)
     run.side[fired] = beyond
     if run.on_guard[fired] == 0:
-        run.on_guard[fired] = order_passed(model, fired)
+        run.on_guard[fired] = BY_SPEED
     run.due[fired] = 0 if touched else 1
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         other = model.outgoing[slot]

@@ -20,6 +20,7 @@ PLAIN = {
     "choice": (Select(Less(0, E), 1 + Y**2, -2), E),
     "choice downwards": (Select(Less(0, E), -3.0, Exp(Y)), -E),
     "parabolas": (E * Absolute(E), E),
+    "whole part": (Floor(E) + 0.5, E),
     "signed root": (Sign(E) * Absolute(E) ** 0.5, E),
     "positive factor": (E**3 * (2 + Sin(Y)), E),
 }
