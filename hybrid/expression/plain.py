@@ -33,7 +33,7 @@ class Choice(NamedTuple):
 
 
 def plain(guard: Expression) -> Expression:
-    """``e`` for an odd power or cubic root of ``e``, ``floor(e) + 1/2`` and a choice by ``e`` of two signs."""
+    """``e`` for an odd power or cubic root of it, ``floor(e) + 1/2``, and a choice by ``e`` of two signs."""
     if isinstance(guard, CubeRoot) or _is_odd_power(guard):
         return plain(guard.args[0])
     choice = _choice(guard)
