@@ -119,7 +119,7 @@ def disagreement(
     system = compiled.system
     found = value(compiled, function, index, t, x, values)
     opaque = _is_opaque(compiled, function.function)
-    signs = function.kind == GUARD and not opaque
+    signs = function.kind == GUARD and compiled.emitted.plain_guard[index]
     text = _difference(system, function.title, function.value, found, t, x, values, opaque, signs)
     if text is not None or function.kind == CONDITION:
         return text
@@ -166,11 +166,12 @@ def _difference(
     opaque: bool,
     signs: bool = False,
 ) -> str | None:
-    """How a value differs from Python's; of a guard that is traced, only its sign (``plain``)."""
+    """How a value differs from Python's; with ``signs``, how its sign does."""
     wanted = evaluate(system.variables, function, t, x, values)
     if wanted is None or len(wanted) != len(found):
         return None
-    if signs and np.all(np.sign(found) == np.sign(wanted)):
+    # A power may vanish where its base does not.
+    if signs and not np.any(np.sign(found) * np.sign(wanted) < 0.0):
         return None
     apart = np.abs(found - wanted)
     if np.all(apart <= SAME_VALUE * np.abs(wanted)):

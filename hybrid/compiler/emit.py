@@ -181,6 +181,7 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
         },
         opaque=writer.opaque,
         affine_guard=affine,
+        plain_guard=tuple(guard.plain for guard in guards),
         guard_in_series=_guards_in_series(system, propagators),
         programs=programs(
             not_affine,
@@ -291,21 +292,19 @@ class _Writer:
     def _write(self, function: ModelFunction) -> Written:
         targets = [at("out", i) for i in range(function.size or 1)]
         try:
-            expressions = self.traced(function)
-            if function.kind == GUARD and function.derivative is None:
-                expressions = [plain(each) for each in expressions]
+            own = self.traced(function)
+            may_be_plain = function.kind == GUARD and function.derivative is None
+            expressions = [*map(plain, own)] if may_be_plain else own
             jacobian = jacobian_of(expressions[: function.kept], self.symbols.variables)
             memory = function.memory_rows(self.system.dimension + 1)
             jacobian += [[ONE if entry else ZERO for entry in row] for row in memory]
             _check_printable(entry for row in jacobian for entry in row if entry is not ZERO)
         except ModelError as error:
             return self._write_opaque(function, targets, error)
-        if function.derivative is None:
-            derivative = cells(jacobian, place_of(function.size))
-        else:
-            derivative = self._given_derivative(function)
         given = function.derivative is not None
-        return Written(assignments(targets, expressions), derivative, expressions, jacobian, given)
+        derivative = self._given_derivative(function) if given else cells(jacobian, place_of(function.size))
+        value, is_plain = assignments(targets, expressions), expressions != own
+        return Written(value, derivative, expressions, jacobian, given, is_plain)
 
     def condition(self, function: ModelFunction) -> Written:
         """Statements for the condition of a guard, whose truth values are 1 and 0."""

@@ -122,6 +122,8 @@ class Emitted:
     affine_guard
         By transition: whether the guard's gradient, its slope in time included, is proved to depend on
         parameters only.
+    plain_guard
+        By transition: whether the guard is compiled in a plain form of the same sign.
     guard_in_series
         By transition: whether the series of its mode hold its guard in a column, which is a polynomial then.
     programs
@@ -181,6 +183,7 @@ class Emitted:
 
     texts: dict[str, str]
     affine_guard: tuple[bool, ...] = attrs.field(metadata=FOR_KERNELS)
+    plain_guard: tuple[bool, ...]
     guard_in_series: tuple[bool, ...] = attrs.field(metadata=FOR_KERNELS)
     programs: Programs
     first_forcing: tuple[int, ...] = attrs.field(metadata=FOR_KERNELS)

@@ -26,7 +26,8 @@ from hybrid.expression.tracing import Symbols
 class Written:
     """Statements for a function and its derivative, but for cells that are proved zero.
 
-    ``expressions`` and ``jacobian`` are the expressions behind them if it was traced.
+    ``expressions`` and ``jacobian`` are the expressions behind them if it was traced. Those of a guard may be
+    its ``plain`` form (`hybrid.expression.plain`), which has the same sign.
     """
 
     value: list[Statement]
@@ -34,6 +35,7 @@ class Written:
     expressions: list[Expression] | None = None
     jacobian: list[list[Expression]] | None = None
     given: bool = False
+    plain: bool = False
 
 
 def called(target: str, name: str, *arguments: Term) -> Statement:

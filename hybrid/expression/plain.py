@@ -55,7 +55,7 @@ def _is_odd_power(expression: Expression) -> bool:
     if not expression.is_power:
         return False
     exponent = expression.args[1]
-    return bool(exponent.is_number and exponent.is_whole and float(exponent) % 2.0 == 1.0)
+    return bool(exponent.is_number and float(exponent) % 2.0 == 1.0)
 
 
 def _plain_product(guard: Expression) -> Expression:

@@ -1,8 +1,9 @@
-"""An event lands on the far side: where its guard has the far sign.
+"""An event lands on the far side: beyond its guard, by more than the rounding of the guard there.
 
 The root of a guard on a step is known up to rounding, on this side of zero or on that. A reset, a condition
 or another guard may ask for the same quantity: ``mod``, ``floor``, ``sign``, a comparison. Each of them must
-find the crossing made. So the state of an event is the first on the flow at which the guard has the far sign.
+find the crossing made. So the state of an event is the first on the flow at which the guard has the far sign
+by more than its rounding, or, where the guard or a force jumps, at which it has jumped.
 
 The flow needs time for that, and a slow crossing would be late. So an event stays at its root if neither its
 guard nor its reset may jump there, and no condition in its mode changes on that way.
@@ -14,6 +15,7 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.clock import forward, set_clock, time_left
 from hybrid.kernels.events.guards import (
+    ROUNDING_OF_STATE,
     allowed,
     guard_speed,
     guard_value,
@@ -25,8 +27,31 @@ from hybrid.kernels.events.moments import moment_of_rounding
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import KERNEL
 
+# The guard of an event is beyond zero by this share of its band, one and a half units in the last place.
+MOST_BEYOND = 1.5 / ROUNDING_OF_STATE
 # A landing is no farther from its guard, or from its jump, than so many times the rounding of the state.
 MOST_BANDS = 64.0
+# The flow goes on through the guard if its speed keeps this share on the way.
+SPEED_KEPT = 0.5
+
+
+@njit(**KERNEL)
+def _is_beyond(model, run, transition, side, t, x, work):
+    """Whether a guard at ``x`` has the sign ``side`` by more than its rounding, or after its jump."""
+    value = guard_value(model, transition, t, x, work.scalar) * side
+    if not value > 0.0:
+        return False
+    if may_jump(model, run, transition, t, x, work):
+        return True
+    model.guard_gradient(transition, t, x, model.parameters, work.gradient)
+    return value >= MOST_BEYOND * rounding_band(model, run, transition, t, x, work)
+
+
+@njit(**KERNEL)
+def _goes_on(model, transition, mode, t, x, side, speed, work):
+    """Whether a guard keeps its ``speed`` up to ``x``, as at a crossing deeper than its rounding."""
+    model.field(mode, t, x, model.parameters, work.field_after)
+    return guard_speed(model, transition, t, x, work.field_after, work.gradient) * side >= SPEED_KEPT * speed
 
 
 @njit(**KERNEL)
@@ -55,7 +80,7 @@ def _shortest_span(model, run, t, work):
 def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, work):
     """``land_beyond`` with the sizes of the state in ``run.scale``; ``jumps`` says that the guard may."""
     n, mode, t = model.dimension, run.mode, run.phase
-    if guard_value(model, transition, t, run.y, work.scalar) * side > 0.0:
+    if _is_beyond(model, run, transition, side, t, run.y, work):
         return
     model.field(mode, t, run.y, model.parameters, work.field)
     speed = guard_speed(model, transition, t, run.y, work.field, work.gradient) * side
@@ -73,7 +98,11 @@ def _advance(model, run, transition, side, jumps, stop_cycle, stop_phase, work):
         forward(run, model.period, span)
         if time_left(model, run, stop_cycle, stop_phase) < 0.0:
             set_clock(run, stop_cycle, stop_phase)
-        if guard_value(model, transition, run.phase, work.state, work.scalar) * side > 0.0:
+        if _is_beyond(model, run, transition, side, run.phase, work.state, work):
+            if speed > 0.0 and not _goes_on(
+                model, transition, mode, run.phase, work.state, side, speed, work
+            ):
+                break
             if not (
                 jumps
                 or model.jumping_reset[transition] == 1
