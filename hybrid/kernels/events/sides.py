@@ -274,7 +274,9 @@ def take_side(model, method, run, place, transition, arrival, known_sides, work)
         # together with the first jump, and has not been stopped there.
         stopped = order == AT_REST and before.order != AT_REST
         crossed, pending = False, pending and before.order > 0 and order > 0 and not stopped
-    known_sides.side[transition], known_sides.zero[transition] = now, order
+    # A marker that a run starts on has crossed nothing, whichever side the next step shows.
+    unknown = model.marker[transition] == 1 and came == STARTED and order == AT_REST
+    known_sides.side[transition], known_sides.zero[transition] = 0 if unknown else now, order
     known_sides.due[transition] = 1 if crossed or pending else 0
     return rests
 
