@@ -21,10 +21,10 @@ from hybrid.kernels.events.sides import mode_of_limit
 from hybrid.kernels.events.surface import jumps_across
 from hybrid.kernels.jumps.locked import (
     begin_at_start,
-    begin_instant,
     change_of_instant,
     follow,
     keep_map,
+    keep_tangents,
     map_of_instant,
     postpone_map,
     restore_tangents,
@@ -88,16 +88,18 @@ def saltation(model, transition, t, x_minus, x_plus, work):
     transversality = cross(model, transition, before, behind, t, x_minus, x_plus, work)
     jumps = jumps_across(model, transition, t, x_minus, work)
     for i in range(n):
-        terms = abs(work.field_after[i]) + abs(work.reset_jacobian[i, n])
-        for j in range(n):
+        moves, terms = work.settled[i] != 0.0, abs(work.field_after[i]) + abs(work.reset_jacobian[i, n])
+        for j in range(n if moves else 0):
             terms += abs(work.reset_jacobian[i, j] * work.field[j])
+        kick, terms = work.settled[i] / transversality, terms / abs(transversality)
         for j in range(n):
             work.saltation[i, j] = work.reset_jacobian[i, j]
             work.sizes[i, j] = abs(work.reset_jacobian[i, j])
-            term = work.settled[i] * work.gradient[j]
-            if term != 0.0 or (jumps and work.settled[i] != 0.0):
-                work.saltation[i, j] += math.inf if jumps else term / transversality
-                work.sizes[i, j] += abs(terms * work.gradient[j] / transversality)
+            if moves and jumps:
+                work.saltation[i, j] = work.sizes[i, j] = math.inf
+            elif moves and work.gradient[j] != 0.0:
+                work.saltation[i, j] += kick * work.gradient[j]
+                work.sizes[i, j] += terms * abs(work.gradient[j])
     return transversality
 
 
@@ -242,7 +244,8 @@ def cross_with_map(model, run, transition, tangents, work):
     n = model.dimension
     transversality = saltation(model, transition, run.phase, run.y, work.new, work)
     change_of_instant(run, n, work)
-    begin_instant(run, n, tangents, work)
+    keep_tangents(run, n, tangents)
+    keep_map(run, n, work)
     return transversality
 
 
