@@ -36,11 +36,11 @@ def plain(guard: Expression) -> Expression:
     """``e`` for an odd power or cubic root of it, ``floor(e) + 1/2``, and a choice by ``e`` of two signs."""
     if isinstance(guard, CubeRoot) or _is_odd_power(guard):
         return plain(guard.args[0])
-    choice = _choice(guard)
     if guard.is_sum and len(guard.args) == 2 and isinstance(guard.args[0], Floor):
         whole, share = guard.args
         if share.is_number and 0.0 < float(share) < 1.0:
             return plain(whole.args[0])
+    choice = _choice(guard)
     # Where the height jumps too, it matters what the choice is at zero.
     if choice is not None and not contains(choice.height, JUMPING):
         above, below = range_of(choice.above), range_of(choice.below)

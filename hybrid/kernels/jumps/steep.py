@@ -33,11 +33,11 @@ def note_steep(model, method, run, speed, work):
     """
     mode, n, moved, lost = run.mode, model.dimension, work.error, 0.0
     band = gradient_band(model, run, run.phase, work.gradient)
+    for i in range(n):
+        moved[i] = band
     for side in (-1.0, 1.0):
         displace(model, run.y, side * band, work.gradient, work.state)
         model.field_jacobian(mode, run.phase, work.state, model.parameters, work.jacobian)
-        for i in range(n):
-            moved[i] = band
         for i in range(n):
             change = spread_of_rate(model, mode, i, work.jacobian, moved)
             # No number: the mode has no field on that side.

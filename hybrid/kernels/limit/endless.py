@@ -41,7 +41,7 @@ def hold_endless(model, run, turn, left, work):
         # A component whose moves shrink has a limit of its own.
         endless = first > least and second >= (1.0 - RESOLVED) * first
         run.trail[ENDLESS, i] = 1.0 if endless else 0.0
-        if run.trail[ENDLESS, i] != 0.0:
+        if endless:
             run.trail[IMPULSE, i], work.settled[i] = 0.0, run.y[i] + left * work.field[i]
 
 

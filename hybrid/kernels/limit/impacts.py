@@ -32,13 +32,8 @@ def series_of_impacts(model, run, transition, work):
     The last columns of ``run.trail`` hold what the next impact compares with: the guard's speed and the time
     left.
     """
-    n, ratio, side, t, x = (
-        model.dimension,
-        run.restitution,
-        -far_side(model, run, transition),
-        run.phase,
-        run.y,
-    )
+    n, ratio, t, x = model.dimension, run.restitution, run.phase, run.y
+    side = -far_side(model, run, transition)
     follows = run.chatter_jumps + 1 == run.jumps and fired_before(run, 1) == transition
     earlier, run.chattering = run.chattering if follows else 0, 0
     if not follows_impact(model, run) or (run.jumps > 2 and not shortens(model, run, 1)):

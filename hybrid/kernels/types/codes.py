@@ -35,7 +35,7 @@ LIMIT_OF_CHATTER = 2
 
 # Rows of Run.trail, and what their last columns hold: the impulse per unit of the guard's speed, and that
 # speed after the last impact; the last estimate of a limit, and the time left until it; marks of components
-# that jumps move for ever, and what the estimate may be off by; such marks at any limit that was taken.
+# that jumps move for ever; such marks at any limit that was taken.
 IMPULSE, LIMIT, ENDLESS, HELD = range(4)
 
 # What in a mode depends on a component of the state, besides its own rate and its own row of resets.
