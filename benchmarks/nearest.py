@@ -109,7 +109,7 @@ NEAREST = {
         "kernels/jumps/test_one_instant.py",
         "kernels/events/test_crossings.py",
     ),
-    "hybrid/kernels/guards/hidden.py": ("kernels/events/test_sampled.py", "kernels/events/test_lift_off.py"),
+    "hybrid/kernels/guards/form.py": ("kernels/events/test_sampled.py", "kernels/events/test_lift_off.py"),
     "hybrid/kernels/runs/initial_mode.py": (
         "simulation/test_simulate.py",
         "kernels/jumps/test_instant.py",
@@ -127,11 +127,6 @@ NEAREST = {
         "kernels/steps/test_series.py",
     ),
     "hybrid/kernels/events/resolution.py": ("kernels/events/test_touches.py",),
-    "hybrid/kernels/guards/sampled.py": (
-        "kernels/events/test_forms.py",
-        "kernels/events/test_jumps_and_gaps.py",
-        "kernels/events/test_domain.py",
-    ),
     "hybrid/kernels/events/sides.py": (
         "kernels/jumps/test_instant.py",
         "kernels/jumps/test_one_instant.py",

@@ -21,8 +21,6 @@ from hybrid.simulation.periods import split_time
 
 # Deep enough for intervals halved down to rounding.
 ISOLATION_DEPTH = 64
-# Parts of a step on which a guard is judged by its leading powers: halves, quarters and eighths of it.
-PARTS = 8
 # Transitions remembered in the order in which they fired: enough to see which go round without end. A power
 # of two.
 RECENT = 64
@@ -164,7 +162,6 @@ def work_layout(method: Any, dimension: int, tangents: int, guards: int, columns
     coupled = len(method.b) if method.implicit else 0
     # Whole vectors of columns are evaluated: there may be a few more than are in use.
     width_of_series = whole_registers(columns, codes.WIDE)
-    width = max(degree, codes.HIGHEST_ORDER if method.order else 0, codes.LEADING) + 4
     shapes = {
         "stages": (stages, length + 1),
         "speeds": (2, stages),
@@ -187,8 +184,6 @@ def work_layout(method: Any, dimension: int, tangents: int, guards: int, columns
         "sizes": (n, n),
         "rounding": (4, n),
         "path": (degree + 3, n + guards),
-        "polynomial": (width,),
-        "stack": (PARTS, width),
         "intervals": (ISOLATION_DEPTH, 2),
         "systems": (n + coupled * (n + 1) + 4, coupled * n),
         "pivots": ((coupled + 1) * n,),

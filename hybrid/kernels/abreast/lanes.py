@@ -8,9 +8,8 @@ from typing import NamedTuple
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import NO_ROOT
 from hybrid.kernels.arithmetic.clock import measured_time
-from hybrid.kernels.events.onset import BY_SPEED
+from hybrid.kernels.events.onset import BY_SPEED, NO_ROOT
 from hybrid.kernels.guards.touch import forget_touches
 from hybrid.kernels.steps.series import (
     AHEAD,

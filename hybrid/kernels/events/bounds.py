@@ -61,37 +61,62 @@ def _whole_line(row):
 
 
 @njit(**KERNEL)
-def bound_state(path, column, middle, radius, row):
-    """Bound a component of the path around ``middle`` by a parabola and its remainder.
+def _bound_place(path, column, place, row):
+    """``bound_state`` at one place; the bend is as good as a step of Halley's method needs."""
+    value, slope, bend, size, steep = 0.0, 0.0, 0.0, 0.0, 0.0
+    # At the start the other powers are zero.
+    for k in range(path.degree if place > 0.0 else min(path.degree, 2), -1, -1):
+        coefficient = path.powers[k, column]
+        bend = bend * place + slope
+        slope = slope * place + value
+        value = value * place + coefficient
+        steep = steep * place + size
+        size = size * place + abs(coefficient)
+    rounding = 4.0 * EPSILON * size if size > abs(path.powers[0, column]) else 0.0
+    row[LOW], row[HIGH] = value - rounding, value + rounding
+    row[LOW_MIDDLE], row[HIGH_MIDDLE] = value - rounding, value + rounding
+    row[LEAST_SLOPE], row[MOST_SLOPE] = slope - 4.0 * EPSILON * steep, slope + 4.0 * EPSILON * steep
+    return bend, bend
 
-    The remainder is at most ``radius**3`` times the sum of ``C(k, 3) |c_k| end**(k - 3)``. A component that
-    is constant on the path has no rounding.
+
+@njit(**KERNEL)
+def bound_state(path, column, middle, radius, row):
+    """Bound a component of the path around ``middle`` by a cubic and its remainder.
+
+    The remainder is at most ``radius**4`` times the sum of ``C(k, 4) |c_k| end**(k - 4)``. A component that
+    is constant on the path has no rounding. Returns the least and the most half of its second derivative.
     """
+    if radius == 0.0:
+        return _bound_place(path, column, middle, row)
     end = middle + radius
-    value, slope, bend = 0.0, 0.0, 0.0
-    size, steep, third = 0.0, 0.0, 0.0
+    value, slope, bend, third = 0.0, 0.0, 0.0, 0.0
+    size, steep, bent, twisted, fourth = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(path.degree, -1, -1):
         coefficient = path.powers[k, column]
+        third = third * middle + bend
         bend = bend * middle + slope
         slope = slope * middle + value
         value = value * middle + coefficient
-        magnitude = abs(coefficient)
+        fourth = fourth * end + twisted
+        twisted = twisted * end + bent
+        bent = bent * end + steep
         steep = steep * end + size
-        size = size * end + magnitude
-        if k > 2:
-            third = third * end + magnitude * (k * (k - 1.0) * (k - 2.0) / 6.0)
+        size = size * end + abs(coefficient)
     rounding = 4.0 * EPSILON * size if size > abs(path.powers[0, column]) else 0.0
     row[LOW_MIDDLE], row[HIGH_MIDDLE] = value - rounding, value + rounding
-    turn = 2.0 * abs(bend) * radius + 3.0 * third * radius * radius
+    square = radius * radius
+    turn = 2.0 * abs(bend) * radius + 3.0 * abs(third) * square + 4.0 * fourth * square * radius
     turn += 4.0 * EPSILON * (steep + turn)
     row[LEAST_SLOPE], row[MOST_SLOPE] = slope - turn, slope + turn
-    rest = third * radius * radius * radius + rounding
+    rest = (abs(third) + fourth * radius) * square * radius + rounding
     one, other = value + radius * (bend * radius - slope), value + radius * (bend * radius + slope)
     low, high = min(one, other), max(one, other)
     if abs(slope) < 2.0 * abs(bend) * radius:
         vertex = value - 0.25 * slope * slope / bend
         low, high = min(low, vertex), max(high, vertex)
     row[LOW], row[HIGH] = low - rest, high + rest
+    change = 3.0 * abs(third) * radius + 6.0 * fourth * square + 4.0 * EPSILON * bent
+    return bend - change, bend + change
 
 
 @njit(**KERNEL)

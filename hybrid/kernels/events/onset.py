@@ -1,9 +1,9 @@
 """How a guard that is zero at the start of a step leaves zero: one rule for all guards and all methods.
 
 A guard that rounding cannot tell from zero at the start of a step counts as zero there. The run knows the
-side to which the flow takes it (``moments``). One that leaves zero by its speed is divided by the step's
-variable, or shifted by its value at the start, which is rounding. Any other one is searched from the moment
-on at which it has left zero: before, its signs are noise.
+side to which the flow takes it (``moments``). One that leaves zero by its speed is shifted by its value at
+the start, which is rounding. Any other one is searched from the moment on at which it has left zero: before,
+its signs are noise.
 
 A guard whose first certain sign is not its side has crossed: at the start of the step if its side there is
 not certain, otherwise after the start. The transition that has just fired does not fire again at the start.
@@ -12,8 +12,6 @@ If a guard lies beyond zero at the start by more than rounding, the rounding of 
 it crosses at the start. If no other step follows, its transition fires at the end of the run.
 """
 
-import math
-
 from numba import njit
 
 from hybrid.kernels.types.options import INLINE
@@ -21,18 +19,14 @@ from hybrid.kernels.types.options import INLINE
 # How a guard that is zero leaves zero: by its speed; some moments later, by a higher derivative or since it
 # jumps; not at all, as far as its moments tell.
 BY_SPEED, LATER, AT_REST = range(1, 4)
+# Returned instead of a share of a step if there is no crossing: beyond the end of every step.
+NO_ROOT = 2.0
 
 
 @njit(**INLINE)
-def known_part(value, slope, on_guard):
-    """Value and slope of a guard at the start of a step that are only rounding: they count as zero.
-
-    Where the guard leaves by its speed, the slope is left alone. Both results are zero for a guard that is
-    searched from a later moment on.
-    """
-    if on_guard not in (BY_SPEED, AT_REST) or not abs(slope) < math.inf:
-        return 0.0, 0.0
-    return value, slope if on_guard == AT_REST else 0.0
+def crosses_towards(direction, side):
+    """Whether a transition with this ``direction`` fires on a crossing to ``side``."""
+    return direction == 0 or direction == side
 
 
 @njit(**INLINE)

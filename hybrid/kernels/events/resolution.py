@@ -2,9 +2,8 @@
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import NO_ROOT
 from hybrid.kernels.events.guards import displace, error_band, guard_speed, guard_value, rounding_band
-from hybrid.kernels.events.onset import BY_SPEED
+from hybrid.kernels.events.onset import BY_SPEED, NO_ROOT
 from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION
 from hybrid.kernels.types.options import INLINE, KERNEL
 

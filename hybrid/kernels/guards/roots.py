@@ -1,56 +1,23 @@
-"""Roots of a guard that is a series, and the place on a step where its clock shows a time."""
+"""Where a guard changes its side or turns, and where a clock shows a time: Newton's method in a bracket."""
 
 import math
-from typing import NamedTuple
 
 from numba import njit
 
+from hybrid.kernels.events.onset import AT_REST, BY_SPEED
 from hybrid.kernels.events.path import value_at
-from hybrid.kernels.types.kinds import REAL
+from hybrid.kernels.guards.form import form_at, is_smooth, middle_slope, sample
+from hybrid.kernels.guards.touch import TOUCHES_APART
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
+# Returned instead of a place on the path if there is none.
+NOWHERE = -1.0
+# More than any bracket in floating-point numbers can be halved, with as many steps of Newton's method.
+MOST_ROOT_STEPS = 200
+
 # Safety factor for the estimated error of the last step towards a root, which leaves out higher derivatives.
 UNSEEN = 64.0
-# Below this share of a root a step of Newton's method is so short that the next one would be rounding.
-SETTLED_STEP = 1e-8
-# Most steps of Newton's method from a root without to one with what is zero at the start up to rounding.
-MOST_CORRECTIONS = 60
-
-
-class Bracket(NamedTuple):
-    """Two places of a step with one root between them, and the values there, up to a positive factor."""
-
-    low: REAL
-    high: REAL
-    left: REAL
-    right: REAL
-
-
-@njit(**INLINE)
-def expanded_at(series, column, first, order, s):
-    """Value, derivative and half the second one of a series divided by its variable to the power ``first``.
-
-    Horner's scheme in ``s**2`` for even and for odd terms, which do not wait for each other.
-    """
-    square = s * s
-    even, even_slope, even_bend = 0.0, 0.0, 0.0
-    odd, odd_slope, odd_bend = 0.0, 0.0, 0.0
-    top = order
-    if (order - first) % 2 == 0:
-        even = series[order, column]
-        top = order - 1
-    for o in range(top, first, -2):
-        odd_bend = odd_bend * square + odd_slope
-        odd_slope = odd_slope * square + odd
-        odd = odd * square + series[o, column]
-        even_bend = even_bend * square + even_slope
-        even_slope = even_slope * square + even
-        even = even * square + series[o - 1, column]
-    value = even + s * odd
-    slope = odd + 2.0 * (s * even_slope + square * odd_slope)
-    bend = even_slope + s * (3.0 * odd_slope + 4.0 * (s * even_bend + square * odd_bend))
-    return value, slope, bend
 
 
 @njit(**KERNEL)
@@ -61,8 +28,11 @@ def time_of(series, clock, order, h, span):
     s = h * math.sqrt(min(max(span / value_at(series, clock, order, h), 0.0), 1.0))
     if s == 0.0:
         return s
-    for _ in range(100):
-        value, slope, _ = expanded_at(series, clock, 0, order, s)
+    for _ in range(MOST_ROOT_STEPS):
+        value, slope = 0.0, 0.0
+        for o in range(order, -1, -1):
+            slope = slope * s + value
+            value = value * s + series[o, clock]
         misfit = value - span
         if misfit > 0.0:
             high = s
@@ -81,59 +51,114 @@ def time_of(series, clock, order, h, span):
 
 
 @njit(**KERNEL)
-def root_between(path, column, known_roots, bracket, side):
-    """The one root of a series in an interval where it is monotone; the sign before it is ``side``.
+def _value_in(model, path, guard, form, work):
+    """Value of a guard at the place of a form.
 
-    The series is divided by its variable for each known root at 0; in the end it is taken as it is, which at
-    0 is zero up to rounding only; but not to a root at 0, where the step begins.
+    Within rounding of a jump or of a vertical tangent bounds are useless: the compiled function is evaluated.
     """
-    s, h = simple_root_of(path, column, known_roots, bracket, side), path.length
-    for _ in range(MOST_CORRECTIONS if known_roots > 0 else 0):
-        value, slope, _ = expanded_at(path.powers, column, 0, path.degree, s)
-        shift = -value / slope if slope != 0.0 else 0.0
-        if not abs(shift) <= 1e-6 * h or not 0.5 * s <= s + shift <= h:
-            break
-        s += shift
-        if abs(shift) <= EPSILON * s:
-            break
-    return s
+    if form.low_middle <= 0.0 <= form.high_middle and not is_smooth(form):
+        return sample(model, guard.transition, path, form.start, work) - guard.base
+    return 0.5 * (form.low_middle + form.high_middle)
+
+
+@njit(**KERNEL)
+def _towards_root(value, form):
+    """The step to a root by Halley's method, by Newton's without a bend; nan if the slope is not known.
+
+    Near a vertical tangent the bounds are wide: a steeper slope than the flattest that they allow would end
+    the method before the root.
+    """
+    slope = form.least_slope if form.least_slope > 0.0 else form.most_slope
+    if not (form.least_slope > 0.0 or form.most_slope < 0.0) or not abs(slope) < math.inf:
+        return math.nan
+    shift = -value / slope
+    turned = shift * 0.5 * (form.least_bend + form.most_bend) / slope
+    # Far from the root, next to a turning point, Halley's steps would be as short as the slope is small.
+    return shift / (1.0 + turned) if abs(turned) < 0.5 else shift
 
 
 @njit(**INLINE)
-def simple_root_of(path, column, known_roots, bracket, side):
-    """``root_between`` of the series divided by what is known, by Halley's method and Newton's in a bracket.
+def is_next_rounding(form, change, length, place):
+    """Whether the error after a step of Halley's method is rounding: about the cube of the step.
 
-    The error after a step of Halley's is about the cube of the step, over the square of the length on which
-    the guard bends: where that is rounding, it need not be looked at.
+    It comes over the square of the length on which the guard bends; higher derivatives are left out.
     """
-    low, high, left, right = bracket
-    s, last = low + (high - low) * (left / (left - right)), high - low
-    if not low < s < high:
-        s = 0.5 * (low + high)
-    for _ in range(100):
-        value, slope, bend = expanded_at(path.powers, column, known_roots, path.degree, s)
-        if value == 0.0:
-            return s
-        if (value > 0.0) == (side > 0):
-            low = s
+    curve = 0.5 * abs((form.least_bend + form.most_bend) / middle_slope(form)) + 1.0 / length
+    return UNSEEN * (curve * change) ** 2 * change <= EPSILON * place
+
+
+@njit(**KERNEL)
+def place_of_change(model, path, guard, form, end, work):
+    """Where a guard leaves its side between the last place where that was sure and ``end``, where it has.
+
+    Before its first certain sign a guard leaves its side where it is beyond the noise; one that is at rest
+    does at the start. One that stays zero for a while, or has no value, has not crossed yet. The place is the
+    root, or the end of its bracket beyond it. The search begins where the ``form`` of the piece tells.
+    """
+    low, high, side, last = guard.sure, end, guard.side, end - guard.sure
+    noise = -side * guard.radius if guard.on_guard == AT_REST else side * guard.radius
+    place = 0.5 * (form.start + form.end)
+    place += _towards_root(0.5 * (form.low_middle + form.high_middle), form)
+    if low == 0.0 and guard.on_guard != BY_SPEED:
+        # The start comes first.
+        place = low
+    elif not low < place < high:
+        place = 0.5 * (low + high)
+    for trial in range(MOST_ROOT_STEPS):
+        at = form_at(model, path, guard, place, work)
+        value = _value_in(model, path, guard, at, work)
+        at_rest = value == 0.0 and at.least_slope == 0.0 and at.most_slope == 0.0
+        value += noise
+        # A guard without a value has not crossed yet: it crosses after that.
+        if value * side > 0.0 or at_rest or math.isnan(value):
+            low = place
+        elif place == 0.0:
+            return 0.0
         else:
-            high = s
-        shift = -value / slope if slope != 0.0 else math.inf
-        curve = bend / slope if slope != 0.0 else math.inf
-        # Far from the root, next to a turning point, Halley's steps would be as short as the slope is small.
-        if abs(shift * curve) < 0.5:
-            shift /= 1.0 + shift * curve
-        closer, change = s + shift, abs(shift)
-        # The steps of the method shrink here; a step that does not shrink is rounding.
-        if change <= EPSILON * s or (last < SETTLED_STEP * s and change > 0.25 * last):
-            return s
-        if low < closer < high:
-            if UNSEEN * ((abs(curve) + 1.0 / path.length) * change) ** 2 * change <= EPSILON * s:
-                return closer
-        else:
-            # A bisection says nothing of how the steps of the method shrink.
-            closer, change = 0.5 * (low + high), math.inf
-        if high - low <= EPSILON * high:
+            high = place
+        if (value == 0.0 and not at_rest) or high - low <= 2.0 * EPSILON * high:
+            break
+        closer = place + _towards_root(value, at)
+        change = abs(closer - place)
+        if change <= EPSILON * place:
+            return place
+        # If Newton's method does not halve its steps, the bracket is halved instead.
+        if not low < closer < high or (trial > 2 and change > 0.5 * last):
+            closer, change = 0.5 * (low + high), high - low
+        elif is_next_rounding(at, change, path.length, place):
             return closer
-        s, last = closer, change
-    return s
+        if closer == place:
+            break
+        place, last = closer, change
+    return high
+
+
+@njit(**KERNEL)
+def place_of_turn(model, path, guard, form, work):
+    """Where a guard comes closest to zero on a piece; ``NOWHERE`` if it does not turn there.
+
+    A turn next to the end of the path counts as on it: the next path may begin beyond the turn, by rounding.
+    """
+    side, low, high = guard.side, form.start, form.end
+    if high == path.length:
+        high *= 1.0 + TOUCHES_APART
+    at = form_at(model, path, guard, high, work)
+    if not (at.most_slope if side > 0 else -at.least_slope) >= 0.0:
+        return NOWHERE
+    place = low
+    for _ in range(MOST_ROOT_STEPS):
+        at = form_at(model, path, guard, place, work)
+        slope = middle_slope(at)
+        if slope * side < 0.0:
+            low = place
+        elif place == low:
+            return NOWHERE
+        else:
+            high = place
+        closer = place - 0.5 * slope / at.least_bend if abs(at.least_bend) < math.inf else math.nan
+        if abs(closer - place) <= EPSILON * high or high - low <= 2.0 * EPSILON * high:
+            break
+        place = closer if low < closer < high else 0.5 * (low + high)
+        if not low < place < high:
+            break
+    return min(place, form.end)

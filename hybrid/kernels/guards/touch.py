@@ -6,8 +6,8 @@ are recorded does not depend on the steps then. A touch at the end of a step bel
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import NO_ROOT
 from hybrid.kernels.events.guards import allowed, keep_grazing
+from hybrid.kernels.events.onset import NO_ROOT
 from hybrid.kernels.types.options import INLINE, KERNEL
 
 # A step is cut at this share of the way from its first touch to its second one: the middle may be a crossing.

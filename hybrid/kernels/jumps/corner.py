@@ -2,7 +2,6 @@
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.events.guards import (
     allowed,
     carry_rounding,
@@ -12,7 +11,7 @@ from hybrid.kernels.events.guards import (
 )
 from hybrid.kernels.events.landing import land_beyond
 from hybrid.kernels.events.moments import Place
-from hybrid.kernels.events.onset import BY_SPEED, LATER
+from hybrid.kernels.events.onset import BY_SPEED, LATER, crosses_towards
 from hybrid.kernels.events.resolution import NOT_KNOWN, leads_to_guard, stays_on_guard, underflows
 from hybrid.kernels.events.sides import (
     FLOWED,

@@ -7,7 +7,6 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.arithmetic.clock import forward, measured_time
 from hybrid.kernels.arithmetic.slopes import spread_of_rate
 from hybrid.kernels.events.guards import (
@@ -19,9 +18,11 @@ from hybrid.kernels.events.guards import (
     size_of_time,
 )
 from hybrid.kernels.events.moments import speed_rounding
+from hybrid.kernels.events.onset import crosses_towards
 from hybrid.kernels.events.sides import mode_of_limit
+from hybrid.kernels.guards.form import NO_COLUMN, Guard
 from hybrid.kernels.guards.isolate import first_change
-from hybrid.kernels.guards.pieces import NO_COLUMN, NOWHERE, Guard
+from hybrid.kernels.guards.roots import NOWHERE
 from hybrid.kernels.jumps.jump import assume_sizes, carry_tangents, go_onward, move
 from hybrid.kernels.jumps.locked import keep_map, keep_tangents
 from hybrid.kernels.jumps.past import fired_before, follows_impact, time_between
@@ -215,8 +216,8 @@ def way_is_free(model, method, run, turn, span, work):
             return False
         if has_program(model, other):
             way = Path(path, 1, -1, t, span, 1.0, True, 1)
-            guard = Guard(other, NO_COLUMN, side, 0, 0.0, 0.0, 0.0)
-            place, _, _ = first_change(model, method, run, way, guard, 0.0, work)
+            guard = Guard(other, NO_COLUMN, side, 0, 0.0, 0.0, 0.0, 0.0)
+            place, _, _ = first_change(model, run, way, guard, 0.0, work)
             crossed = place != NOWHERE
         else:
             end = guard_value(model, other, t + span, work.settled, work.scalar)

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import NO_ROOT, crosses_towards
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.events.guards import guard_speed, guard_value, may_jump, rounding_band
+from hybrid.kernels.events.onset import NO_ROOT, crosses_towards
 from hybrid.kernels.events.resolution import speed_displaced
 from hybrid.kernels.steps.step import attempt_again
 from hybrid.kernels.types.codes import NO_TRANSITION

@@ -10,13 +10,12 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.arithmetic.bernstein import crosses_towards
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.columns import evaluate, evaluate_with_sizes, gather_tangents
 from hybrid.kernels.events.bounds import bound_state
 from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced, sides_at
 from hybrid.kernels.events.moments import speed_rounding
-from hybrid.kernels.events.onset import BY_SPEED
+from hybrid.kernels.events.onset import BY_SPEED, crosses_towards
 from hybrid.kernels.events.path import state_at, time_at, up_to, value_at
 from hybrid.kernels.events.record import start_record
 from hybrid.kernels.events.resolution import restore_sides

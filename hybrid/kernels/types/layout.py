@@ -300,10 +300,9 @@ class Work(Structure):
     its end; ``scale_before (n,)``, sizes of the state that the run goes back to; ``saltation, sizes (n, n)``;
     ``rounding (4, n)``, how far the rates move, and the place where a guard's derivatives are asked for;
     ``path (d + 3, n + guards)``, the powers of the step's interpolant and of guards on it, their values at
-    its end and what these are sums of; ``polynomial (q + 1,)`` of a guard, ``stack`` and ``intervals`` for
-    its isolation; ``registers (r, 6)``, what is known of each row of a program, and ``samples (nodes + 1,
-    2 r)`` the ranges of these rows at the
-    nodes of a step and what they have in common; ``rates (2, N)``, the field along a step.
+    its end and what these are sums of; ``intervals`` for the isolation of a guard; ``registers (r, 6)``, what
+    is known of each row of a program, and ``samples (nodes + 1, 2 r)`` the ranges of these rows at the nodes
+    of a step and what they have in common; ``rates (2, N)``, the field along a step.
 
     For implicit methods, else empty: ``systems ((s + 1) n + s + 4, s n)``, ``pivots ((s + 1) n,)``. The rows
     are the factored matrix of the stages, that of the estimate's filter ``(n, n)``, a right-hand side, and
@@ -334,8 +333,6 @@ class Work(Structure):
     sizes: MATRIX
     rounding: MATRIX
     path: MATRIX
-    polynomial: VECTOR
-    stack: MATRIX
     intervals: MATRIX
     registers: MATRIX
     samples: MATRIX
@@ -388,7 +385,7 @@ class Attempts(Structure):
     ``attempt_implicit`` is the step of an implicit method; ``explained_step``, ``explained_attempt`` and
     ``explained_series`` shorten a step so that no pulse of the field is hidden from it; ``follows_attempt``
     compares the interpolant of a step with the field;
-    ``crossing_on_path`` finds the crossing of a guard that no cheap proof decides.
+    ``crossing_on_path`` finds the crossing of a guard that may not keep to its side.
     """
 
     attempt_implicit: function(REAL, Model, Method, INTEGER, REAL, REAL, VECTOR, INTEGER, Work)
@@ -396,7 +393,7 @@ class Attempts(Structure):
     explained_attempt: function(REAL, Model, Method, Run, REAL, Work)
     follows_attempt: function(TRUTH, Model, Method, Run, REAL, Work)
     explained_series: function(REAL, Model, Method, Run, INTEGER, Path, Work)
-    crossing_on_path: function(Pair(REAL), Model, Method, Run, INTEGER, INTEGER, Path, REAL, Work)
+    crossing_on_path: function(Pair(REAL), Model, Method, Run, INTEGER, INTEGER, Path, Work)
 
 
 class Task(Structure):

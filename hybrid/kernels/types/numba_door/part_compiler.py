@@ -25,6 +25,8 @@ THOROUGHLY = (
     "hybrid.kernels.steps.series",
     "hybrid.kernels.guards.first_event",
     "hybrid.kernels.steps.series_length",
+    "hybrid.kernels.guards.isolate",
+    "hybrid.kernels.guards.form",
     "hybrid.kernels.guards.roots",
 )
 # Numba's passes that change nothing in a kernel. The legalisation marks where variables end, which only

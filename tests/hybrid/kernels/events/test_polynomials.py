@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybrid.kernels.arithmetic.bernstein import NO_ROOT
-from hybrid.kernels.events.onset import BY_SPEED, LATER
+from hybrid.kernels.events.onset import NO_ROOT
 from hybrid.kernels.guards import isolate
-from hybrid.kernels.guards.pieces import NOWHERE, Guard
+from hybrid.kernels.guards.form import Guard
+from hybrid.kernels.guards.roots import NOWHERE
 from hybrid.kernels.types.codes import EXACT
 from hybrid.kernels.types.layout import Path
 from tests.hybrid.kernels.plain import plain
@@ -39,7 +39,7 @@ def powers(roots, pairs=()):
     return product
 
 
-def crossing(coefficients, side, direction=0, on_guard=0, hidden=0.0):
+def crossing(coefficients, side, direction=0, sure=0.0):
     """Place of the first crossing on [0, 1] of a polynomial in powers, and the side after it."""
     coefficients = np.array([[float(each)] for each in coefficients])
     path = Path(coefficients, len(coefficients) - 1, -1, 0.0, 1.0, 1.0, True, 1)
@@ -64,10 +64,10 @@ def crossing(coefficients, side, direction=0, on_guard=0, hidden=0.0):
         state=np.zeros(1), scalar=np.zeros(1), gradient=np.zeros(2), registers=np.zeros((1, 6)),
         intervals=np.zeros((64, 2)),
     )  # fmt: skip
-    guard = Guard(0, 0, side, on_guard, 0.0, 0.0, 0.0)
-    place, after, proved = kernels.first_change(model, None, run, path, guard, hidden, work)
+    guard = Guard(0, 0, side, 0, sure, 0.0, 0.0, 0.0)
+    place, guard, proved = kernels.first_change(model, run, path, guard, sure, work)
     assert (proved, run.unproved.sum()) == (1.0, 0)
-    return place, after
+    return place, guard.side
 
 
 def exact_crossing(roots, pairs, direction):
@@ -194,7 +194,7 @@ def test_roots_at_the_start_are_not_found_again(noise):
     """As after a very short bounce: the guard is zero now, up to rounding, and again a little later."""
     coefficients = np.array(powers((0, 1e-6)), dtype=float)
     coefficients[0] = noise
-    assert crossing(-coefficients, 1, -1, BY_SPEED) == (pytest.approx(1e-6, rel=1e-4), -1)
+    assert crossing(-coefficients, 1, -1, 1e-9) == (pytest.approx(1e-6, rel=1e-4), -1)
     coefficients = np.array(powers((0, 0, 0.3)), dtype=float)
     coefficients[:2] = noise, -noise
-    assert crossing(coefficients, -1, 1, LATER, hidden=1e-6)[0] == pytest.approx(0.3, abs=1e-14)
+    assert crossing(coefficients, -1, 1, 1e-6)[0] == pytest.approx(0.3, abs=1e-14)
