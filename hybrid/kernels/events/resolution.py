@@ -160,9 +160,7 @@ def stays_on_guard(model, method, run, work):
             returns = transition == fired
         else:
             returns = model.target[transition] == left and model.surface[transition] == model.surface[fired]
-        direction = model.direction[transition]
-        leaves = run.on_guard[transition] == BY_SPEED and run.side[transition] == -direction
-        if not returns or leaves:
+        if not returns:
             continue
         value = guard_value(model, transition, t, run.y, work.scalar)
         model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
