@@ -151,7 +151,7 @@ def take_clear_sides(model, run):
     for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
         other = model.outgoing[slot]
         run.side[other], run.on_guard[other] = run.tried_side[other], run.tried_order[other]
-        run.due[other], run.event_side[other] = 0, 0
+        run.due[other] = 0
     run.clear = 0
 
 
@@ -428,7 +428,7 @@ def reaches_one_guard(model, run):
         if other != fired and (model.surface[other] == model.surface[fired] or run.order_before[other] > 0):
             return False
     run.side[fired] = -run.side[fired]
-    run.on_guard[fired], run.due[fired], run.event_side[fired] = BY_SPEED, 1, 0
+    run.on_guard[fired], run.due[fired] = BY_SPEED, 1
     return True
 
 

@@ -91,7 +91,6 @@ def reach_end(sea, task, on_guard, row):
     The event is left pending. The step may have begun ``on_guard``.
     """
     run, fired = task.run, sea.fired[row]
-    run.event_side[fired] = run.side[fired]
     stay, span = run.since_entry, sea.ends[row]
     gap = land_series(task.model, run, task.tangents, fired, run.phase, stay, span, task.work)
     run.pending = fired

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from numba import njit
 
 from hybrid.kernels.arithmetic.clock import measured_time
-from hybrid.kernels.events.onset import BY_SPEED, NO_ROOT
+from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.guards.touch import forget_touches
 from hybrid.kernels.steps.series import (
     AHEAD,
@@ -124,4 +124,4 @@ def clear_guards(model, run, steps):
         transition = model.outgoing[slot]
         # Only the first step may have begun on a guard.
         run.order_before[transition] = run.on_guard[transition] if steps == 1 else 0
-        run.on_guard[transition], run.event_side[transition], run.passed[transition] = 0, 0, NO_ROOT
+        run.on_guard[transition] = 0

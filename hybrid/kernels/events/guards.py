@@ -216,25 +216,6 @@ def widen_scale(model, run, work):
             run.scale[i] = max(run.scale[i], rate * moment)
 
 
-@njit(**KERNEL)
-def sides_at(model, run, t, work):
-    """Update the sides of the mode's guards to the state of the run at the time ``t``.
-
-    A guard that is zero there counts as not yet crossed: it keeps the side before the crossing. It stays
-    without a side if the next step has to show the side. A guard without a value there keeps its side.
-    """
-    mode = run.mode
-    for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
-        transition = model.outgoing[slot]
-        direction = model.direction[transition]
-        value = guard_value(model, transition, t, run.y, work.scalar)
-        model.guard_gradient(transition, t, run.y, model.parameters, work.gradient)
-        if abs(value) > rounding_band(model, run, transition, t, run.y, work):
-            run.side[transition] = 1 if value > 0.0 else -1
-        elif direction != 0 and run.side[transition] != 0 and not math.isnan(value):
-            run.side[transition] = -direction
-
-
 @njit(**INLINE)
 def error_band(method, run, gradient, n):
     """How far the tolerances can move a guard with this gradient; a turn closer to zero is a grazing."""

@@ -3,12 +3,10 @@
 from numba import njit
 
 from hybrid.kernels.events.guards import displace, error_band, guard_speed, guard_value, rounding_band
-from hybrid.kernels.events.onset import BY_SPEED, NO_ROOT
+from hybrid.kernels.events.onset import NO_ROOT
 from hybrid.kernels.types.codes import NO_MODE, NO_TRANSITION
 from hybrid.kernels.types.options import INLINE, KERNEL
 
-# The side of a guard before an event, in ``run.event_side``, if the step before has not told it.
-NOT_KNOWN = 2
 # The last terms of a series for a guard below this size may have lost their digits.
 UNDERFLOW = 1e-250
 # Speeds as near to a guard as its rounding, and so many times farther, tell how the speed grows with the
@@ -23,56 +21,22 @@ def keep_side(run, transition):
     run.side_before[transition] = run.side[transition]
     run.order_before[transition] = run.on_guard[transition]
     run.unproved_before[transition] = run.unproved[transition]
-    run.event_side[transition], run.passed[transition] = 0, NO_ROOT
+    run.changes[transition] = NO_ROOT
 
 
 @njit(**INLINE)
-def keep_change(run, transition, side):
-    """Note a guard's ``side`` at the end of a step on which it has no crossing that fires.
+def sides_at_share(model, run, share, fired):
+    """Give guards the sides that they have at a share of the step, before the event of ``fired`` there.
 
-    An event of another guard may end the step before. Where rounding hides the guard there, its side is that
-    from the start of the step if the event is closer to the change of sides than to the end of the step.
-    """
-    run.side[transition] = side
-    before = run.side_before[transition]
-    if side != before and before != 0 and run.passed[transition] < NO_ROOT:
-        run.event_side[transition] = side
-        run.passed[transition] = 0.5 * (run.passed[transition] + 1.0)
-        return
-    run.passed[transition] = NO_ROOT
-    if side != before:
-        run.event_side[transition] = before if before != 0 else NOT_KNOWN
-
-
-@njit(**INLINE)
-def keep_crossing(run, transition, theta, side):
-    """Note a crossing at the share ``theta`` of the step, to ``side``."""
-    run.event_side[transition] = -side
-    if run.passed[transition] < NO_ROOT:
-        run.passed[transition] = 0.5 * (run.passed[transition] + theta)
-
-
-@njit(**INLINE)
-def keep_outcome(run, transition, theta, side):
-    """Note a guard's crossing at the share ``theta`` of the step, or its ``side`` at the end without one."""
-    if theta == NO_ROOT:
-        keep_change(run, transition, side)
-    else:
-        keep_crossing(run, transition, theta, side)
-
-
-@njit(**KERNEL)
-def set_sides_before(model, run, earliest):
-    """Make the kept sides before crossings those at the ``earliest`` crossing of all guards.
-
-    A guard that crosses in its direction later may start the step on the side to which it crosses, and be
-    there still. If the event is closer to that change of sides than to the crossing, the guard has not
-    crossed again, whatever rounding and the error of the step make of its sign there.
+    A guard that crosses in its direction may have passed zero the other way before; where that was the last
+    to happen, it is there still. If the event is closer to that passing than to the crossing, the guard has
+    not crossed again, whatever rounding and the error of the step make of its sign there.
     """
     for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
         transition = model.outgoing[slot]
-        if earliest < run.passed[transition] < NO_ROOT:
-            run.event_side[transition] = -run.event_side[transition]
+        before = run.side_before[transition]
+        if transition != fired:
+            run.side[transition] = -before if run.changes[transition] < share else before
 
 
 @njit(**KERNEL)
@@ -83,7 +47,6 @@ def restore_sides(model, run):
         run.side[transition] = run.side_before[transition]
         run.on_guard[transition] = run.order_before[transition]
         run.unproved[transition] = run.unproved_before[transition]
-        run.event_side[transition] = 0
 
 
 @njit(**KERNEL)

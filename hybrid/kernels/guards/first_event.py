@@ -24,9 +24,8 @@ from hybrid.kernels.events.onset import BY_SPEED, NO_ROOT
 from hybrid.kernels.events.path import end_of, time_along, time_at
 from hybrid.kernels.events.resolution import (
     UNDERFLOW,
-    keep_outcome,
     keep_side,
-    set_sides_before,
+    sides_at_share,
     underflows,
 )
 from hybrid.kernels.guards.form import NO_COLUMN, in_column
@@ -169,10 +168,6 @@ def crosses_beyond_errors(model, method, run, transition, column, path, work):
 def crossing_of(task, transition, column, path, attempted):
     """Where a guard crosses, the share of the step that is proved, and whether the crossing is resolved."""
     attempts, model, method, run, _, work = task_of(task)
-    on_guard = run.on_guard[transition]
-    theta, share = attempts.crossing_on_path(model, method, run, transition, column, path, work)
-    side = run.event_side[transition]
-    run.event_side[transition] = 0
     if column != NO_COLUMN:
         small = underflows_in_column(path.powers, column, path.degree)
     else:
@@ -180,12 +175,13 @@ def crossing_of(task, transition, column, path, attempted):
         later = time_at(path, path.length)
         small = underflows(model, transition, path.start, run.y, later, work.trial, work.scalar)
     if small:
-        return NO_ROOT, share, True
+        return NO_ROOT, 1.0, True
+    on_guard = run.on_guard[transition]
+    theta, share = attempts.crossing_on_path(model, method, run, transition, column, path, work)
     resolved = is_resolved(model, run, transition, column, path, attempted, on_guard, work)
-    plain = resolved and theta < NO_ROOT and column != NO_COLUMN and side == -run.side[transition]
+    plain = resolved and theta == run.changes[transition] < NO_ROOT and column != NO_COLUMN
     plain = plain and crosses_beyond_errors(model, method, run, transition, column, path, work)
     run.crossings += 1 if plain else UNCERTAIN
-    keep_outcome(run, transition, theta, side)
     return theta, share, resolved
 
 
@@ -219,9 +215,8 @@ def first_event(task, path, attempted, ignored, touched):
     Returns ``(theta, transition, proved, blurred)``, with ``(NO_ROOT, NO_TRANSITION)`` if nothing crosses
     before the share ``proved`` of the step, to which the step is to be cut. ``blurred`` is a transition whose
     guard changes sides, or grazes, on the step, although ``is_resolved`` is false for it, or none. The sides
-    of guards without a crossing are brought up to date, to the end of the step, and guards that were left are
-    no longer held to be zero at its start; ``resolution.restore_sides`` takes that back. For a guard with a
-    crossing, ``run.event_side`` holds its side before that.
+    are brought up to date, to the event, the cut or the end, and guards that were left are no longer held to
+    be zero at the start of the step; ``resolution.restore_sides`` takes that back.
     """
     _, model, _, run, _, work = task_of(task)
     mode, powers, order = run.mode, path.powers, path.degree
@@ -253,5 +248,9 @@ def first_event(task, path, attempted, ignored, touched):
             blurred = transition
         if theta < earliest:
             earliest, fired = theta, transition
-    set_sides_before(model, run, earliest)
-    return earliest, fired, min(proved, share_with_one_touch(run)), blurred
+    proved = min(proved, share_with_one_touch(run))
+    if proved < min(earliest, 1.0):
+        sides_at_share(model, run, proved, NO_TRANSITION)
+    elif fired != NO_TRANSITION:
+        sides_at_share(model, run, earliest, fired)
+    return earliest, fired, proved, blurred

@@ -100,6 +100,9 @@ def first_change(model, run, path, guard, first, work):
             touch, top = _noted(run, path, guard, touch), top - 1
             guard = _sure_at(guard, form, clear)
             continue
+        if -guard.radius <= form.low and form.high <= guard.radius:
+            top -= 1
+            continue
         if not signs_are_told(model, path, guard, form, work) and halves_tell_more(
             model, path, guard, form, work
         ):
@@ -135,7 +138,7 @@ def first_change(model, run, path, guard, first, work):
             if not again:
                 if crosses_towards(model.direction[transition], after):
                     return place, guard, length
-                run.passed[transition] = place / length
+                run.changes[transition] = place / length
             continue
         if touch.place != NOWHERE and touch.depth < min(abs(at.low), abs(at.high)):
             touch = _noted(run, path, guard, touch)
@@ -221,11 +224,11 @@ def crossing_on_path(model, method, run, transition, column, path, work):
     """``first_change`` from the side that the run knows.
 
     ``column`` is that of the guard on the path, or ``NO_COLUMN``. Returns the share of the step at which the
-    guard crosses, and the share that is proved; the side after the crossing, or at the end, goes to
-    ``run.event_side[transition]``. The guard is no longer held to be zero at the start of the step, unless it
-    stays there: it leaves zero on a later step.
+    guard crosses, and the share that is proved. The run knows then the side before the crossing, or at the
+    end, and where it has changed before; the guard is no longer held to be zero at the start of the step,
+    unless it stays there: it leaves zero on a later step.
     """
-    on_guard, run.event_side[transition] = run.on_guard[transition], run.side[transition]
+    on_guard = run.on_guard[transition]
     guard, first = _at_start(model, method, run, path, transition, column, work)
     if column == NO_COLUMN and not has_program(model, transition):
         run.unproved[transition] += 1
@@ -243,5 +246,8 @@ def crossing_on_path(model, method, run, transition, column, path, work):
         if after * guard.side < 0 and crosses_towards(model.direction[transition], after):
             place = NOWHERE if has_just_fired(run, transition, on_guard) else 0.0
         guard = _sure_at(guard, form_at(model, path, guard, path.length, work), after)
-    run.on_guard[transition], run.event_side[transition] = 0, guard.side
-    return (NO_ROOT if place == NOWHERE else place / path.length), proved / path.length
+    theta, passed = (NO_ROOT if place == NOWHERE else place / path.length), run.changes[transition]
+    run.on_guard[transition] = 0
+    run.side[transition] = guard.side if theta == NO_ROOT else -guard.side
+    run.changes[transition] = theta if passed == NO_ROOT else 0.5 * (passed + min(theta, 1.0))
+    return theta, proved / path.length

@@ -12,7 +12,7 @@ from hybrid.kernels.events.guards import (
 from hybrid.kernels.events.landing import land_beyond
 from hybrid.kernels.events.moments import Place
 from hybrid.kernels.events.onset import BY_SPEED, LATER, crosses_towards
-from hybrid.kernels.events.resolution import NOT_KNOWN, leads_to_guard, stays_on_guard, underflows
+from hybrid.kernels.events.resolution import leads_to_guard, stays_on_guard, underflows
 from hybrid.kernels.events.sides import (
     FLOWED,
     LANDED,
@@ -95,7 +95,6 @@ def arrived(task):
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         transition = model.outgoing[slot]
         before = run.side[transition]
-        run.event_side[transition] = 0
         if found != NO_TRANSITION or before == 0 or run.on_guard[transition] != 0:
             continue
         if underflows(model, transition, t, run.y, t, run.y, work.scalar):
@@ -170,16 +169,6 @@ def is_turned_back(model, run, transition, before, work):
 
 
 @njit(**KERNEL)
-def recall_sides(model, run):
-    """Give guards that cross here or later on the step the sides that they had before it."""
-    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
-        other = model.outgoing[slot]
-        if run.event_side[other] != 0:
-            run.side[other] = run.event_side[other] if run.event_side[other] != NOT_KNOWN else 0
-            run.event_side[other] = 0
-
-
-@njit(**KERNEL)
 def has_only_touched(model, run, record, fired, side, work):
     """Whether the flow has only touched a guard, with the ``side`` beyond it; then a grazing is kept."""
     t = run.phase
@@ -224,7 +213,6 @@ def first_in_order(task, fired, stop_cycle, stop_phase):
     """
     _, model, method, run, record, work = task_of(task)
     mode = run.mode
-    recall_sides(model, run)
     direction = model.direction[fired]
     beyond = direction if direction != 0 else -run.side[fired]
     land_beyond(model, run, fired, beyond, stop_cycle, stop_phase, work)

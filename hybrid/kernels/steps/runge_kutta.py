@@ -6,7 +6,7 @@ from numba import njit
 
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.tangent import independence
-from hybrid.kernels.events.guards import ROUNDING_OF_STATE, guard_value, is_forced, sides_at
+from hybrid.kernels.events.guards import ROUNDING_OF_STATE, guard_value, is_forced
 from hybrid.kernels.events.onset import BY_SPEED
 from hybrid.kernels.events.path import state_at
 from hybrid.kernels.events.record import start_record
@@ -200,7 +200,7 @@ def find_event(task, h, interpolated):
             return proved * h, 0.0, NO_TRANSITION
         if fired == NO_TRANSITION:
             break
-        side = run.event_side[fired]
+        side = run.side[fired]
         shortened, correction, first = land_on_first(task, fired, h, theta)
         if shortened != NOT_THERE:
             return shortened, correction, first
@@ -322,8 +322,6 @@ def take(task, h, correction, fired, whole):
     accept(model, method, run, tangents, h, correction, work)
     run.pending = fired
     if fired == NO_TRANSITION:
-        if h < whole:
-            sides_at(model, run, t + h, work)
         carry_rates(method, model.dimension * (1 + tangents), work)
 
 

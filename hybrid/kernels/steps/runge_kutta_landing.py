@@ -53,14 +53,11 @@ def reach_any(task, h):
     """
     _, model, _, run, _, work = task_of(task)
     for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
-        run.event_side[model.outgoing[slot]] = 0
-    for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
         transition = model.outgoing[slot]
         side = run.side[transition]
         if run.on_guard[transition] == 0 and crosses_towards(model.direction[transition], -side):
             length = reach(model, run, transition, run.phase, h, task.tangents, work)
             if length != NOT_THERE:
-                run.event_side[transition] = side
                 return length, transition
     return NOT_THERE, NO_TRANSITION
 
@@ -195,10 +192,10 @@ def passed_before(model, run, fired, t, work):
     """
     for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
         transition = model.outgoing[slot]
-        side = run.event_side[transition]
-        # Where no crossing fires, the side is already that at the end of the step.
-        fires = side != 0 and side == run.side[transition] and run.passed[transition] == NO_ROOT
-        if transition != fired and fires and sign_at_end(model, run, transition, t, work) == -side:
+        side = run.side[transition]
+        fires = run.changes[transition] < NO_ROOT and crosses_towards(model.direction[transition], -side)
+        fires = fires and side != 0 and transition != fired
+        if fires and sign_at_end(model, run, transition, t, work) == -side:
             return transition
     return NO_TRANSITION
 
@@ -212,7 +209,7 @@ def land_on_first(task, fired, h, theta):
     """
     _, model, _, run, _, work = task_of(task)
     mode = run.mode
-    length, correction = land(task, fired, run.event_side[fired], h, theta)
+    length, correction = land(task, fired, run.side[fired], h, theta)
     for _ in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         if not length > 0.0:
             break
@@ -220,10 +217,10 @@ def land_on_first(task, fired, h, theta):
         if other == NO_TRANSITION:
             break
         end = length
-        length, correction = land(task, other, run.event_side[other], end, 1.0)
+        length, correction = land(task, other, run.side[other], end, 1.0)
         if length == NOT_THERE:
             # The guard only comes close to zero: the landing before stands.
-            length, correction = land(task, fired, run.event_side[fired], end, 1.0)
+            length, correction = land(task, fired, run.side[fired], end, 1.0)
             break
         fired = other
     return length, correction, fired

@@ -13,7 +13,7 @@ from numba import njit
 from hybrid.kernels.arithmetic.clock import measured_time
 from hybrid.kernels.arithmetic.columns import evaluate, evaluate_with_sizes, gather_tangents
 from hybrid.kernels.events.bounds import bound_state
-from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced, sides_at
+from hybrid.kernels.events.guards import guard_speed, guard_value, is_forced
 from hybrid.kernels.events.moments import speed_rounding
 from hybrid.kernels.events.onset import BY_SPEED, crosses_towards
 from hybrid.kernels.events.path import state_at, time_at, up_to, value_at
@@ -350,14 +350,12 @@ def end_at_root(model, run, path, work):
     mode, series, pace = run.mode, path.powers, path.powers[1, path.clock]
     first, near = model.first_outgoing[mode], ROUNDING_OF_STAY * measured_time(model, run, mode)
     for slot in range(first, model.first_outgoing[mode + 1]):
-        run.event_side[model.outgoing[slot]] = 0
-    for slot in range(first, model.first_outgoing[mode + 1]):
         transition, column = model.outgoing[slot], model.dimension + slot - first
         value, slope, side = series[0, column], series[1, column], run.side[transition]
         ends = model.guard_in_series[transition] == 1 and crosses_towards(model.direction[transition], -side)
         if ends and value * slope < 0.0 and pace * abs(value) <= near * abs(slope):
             project_on_guard(model, run, transition, run.phase, work)
-            run.event_side[transition], run.pending = side, transition
+            run.pending = transition
             return GO_ON, 0.0
     return STEP_TOO_SMALL, 0.0
 
@@ -398,8 +396,6 @@ def series_step(task, remaining):
         for column in range(n, n + guards):
             series[method.order + 1, column] = series[order + 1, column]
     run.stage = READY
-    if cut:
-        sides_at(model, run, path.start + span, work)
     if fired != NO_TRANSITION:
         stay = run.since_entry + span
         span += land_series(model, run, tangents, fired, path.start + span, stay, span, work)

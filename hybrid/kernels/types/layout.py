@@ -229,10 +229,10 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     - ``recent``: the last to fire; jump ``j`` is at ``j`` modulo the length. ``fires``: how often each has.
       ``visits (64, n + 2)``: the states right after those jumps, with their phases and cycles.
     - ``side_before, order_before, unproved_before (transitions,)``: ``side, on_guard, unproved`` at the start
-      of the last step, and ``event_side`` the side of each guard before the crossing found on it.
-      ``tried_side, tried_due, tried_order``: the same as ``side, due, on_guard`` behind a jump that is tried.
-    - ``passed (transitions,)``: the share of the last step at which each guard changed sides without firing
-      before its crossing, then the middle between the two; ``NO_ROOT`` if it did not. ``unproved
+      of the last step. ``tried_side, tried_due, tried_order``: the same as ``side, due, on_guard`` behind a
+      jump that is tried.
+    - ``changes (transitions,)``: the share of the last step from which on each guard counts as on the other
+      side than before, at a crossing or on the way to it; ``NO_ROOT`` if it does not. ``unproved
       (transitions,)``: on how many steps the crossings of each guard are not proved.
     - ``tick (transitions,)``: the number of the next tick of each transition; ``ticked (transitions,)``: that
       of the first tick of a clock that has not fired anything yet. ``ticks`` are the numbers of all
@@ -269,11 +269,10 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     side_before: INDICES
     order_before: INDICES
     unproved_before: INDICES
-    event_side: INDICES
     tried_side: INDICES
     tried_due: INDICES
     tried_order: INDICES
-    passed: VECTOR
+    changes: VECTOR
     unproved: INDICES
     visits: MATRIX
     tick: INDICES

@@ -57,7 +57,7 @@ def crossing(coefficients, side, direction=0, sure=0.0):
         target=np.zeros(1),
     )
     run = SimpleNamespace(
-        mode=0, y=np.zeros(1), scale=np.zeros(1), passed=[NO_ROOT], last_fired=-1, since_entry=1.0,
+        mode=0, y=np.zeros(1), scale=np.zeros(1), changes=[NO_ROOT], last_fired=-1, since_entry=1.0,
         unproved=np.zeros(1, int), grazing_place=NO_ROOT, next_grazing=NO_ROOT,
     )  # fmt: skip
     work = SimpleNamespace(

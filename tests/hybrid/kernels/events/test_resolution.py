@@ -124,7 +124,8 @@ def test_a_state_that_its_field_holds_on_a_guard_arrives_once(name, reset, solve
             arc = simulate(system, (unit,), (0.0, 3.0), mode="m", solver=chosen)
             assert arc.status.code == StatusCode.ACCUMULATION
             assert "'zero'" in arc.status.message
-            assert len(arc.jumps) <= 1
+            # Dry friction may bring the state back once, from beyond the guard.
+            assert len(arc.jumps) <= (2 if name == "dry friction" else 1)
             assert arc.t[-1] == pytest.approx(end, abs=1e-2)
 
 
