@@ -13,8 +13,6 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 ROUNDING_OF_STATE = 16
 # How far from zero a jump may leave a guard, as a multiple of its rounding band.
 LEFT_BEHIND = 16.0
-# The row of ``work.rounding`` for a place beside the state.
-PLACE = 3
 
 
 @njit(**INLINE)
@@ -244,7 +242,7 @@ def guard_acceleration(model, run, transition, mode, t, x, work):
     field. That of any other guard is the difference quotient of its speed.
     """
     n = model.dimension
-    slopes_at_guard(model, run, transition, mode, t, x, work)
+    model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
     total = acceleration_along(model, mode, work)
     if model.affine_guard[transition] == 1:
         return total
@@ -266,25 +264,6 @@ def guard_acceleration(model, run, transition, mode, t, x, work):
     after = guard_speed(model, transition, t + epsilon, work.state, work.field, work.gradient)
     model.guard_gradient(transition, t, x, model.parameters, work.gradient)
     return total + (after - before) / epsilon
-
-
-@njit(**KERNEL)
-def slopes_at_guard(model, run, transition, mode, t, x, work):
-    """The Jacobian of a mode at a guard into ``work.jacobian``; ``work.gradient`` is current.
-
-    The slope of a root of the guard grows without limit towards the guard. Next to the guard it is no measure
-    of what rounding does to the rates. Just beyond the guard, where the mode ends, it is zero.
-    """
-    direction = model.direction[transition]
-    if model.steep[mode] == 1 and direction != 0:
-        value = abs(guard_value(model, transition, t, x, work.scalar))
-        band = gradient_band(model, run, t, work.gradient)
-        if value <= LEFT_BEHIND * band:
-            place = work.rounding[PLACE]
-            displace(model, x, direction * (value + band), work.gradient, place)
-            model.field_jacobian(mode, t, place, model.parameters, work.jacobian)
-            return
-    model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
 
 
 @njit(**KERNEL)

@@ -25,7 +25,6 @@ from hybrid.kernels.events.guards import (
     pace_of_feedback,
     rounding_band,
     size_of_time,
-    slopes_at_guard,
     spread_of_terms,
 )
 from hybrid.kernels.types.layout import EPSILON
@@ -80,7 +79,7 @@ def speed_rounding(model, run, transition, mode, t, x, work):
     programs of their own (``Model.residue_component``).
     """
     n, gradient, total = model.dimension, work.gradient, abs(work.gradient[model.dimension])
-    slopes_at_guard(model, run, transition, mode, t, x, work)
+    model.field_jacobian(mode, t, x, model.parameters, work.jacobian)
     for i in range(n):
         if gradient[i] != 0.0:
             spread = abs(work.field[i]) + abs(work.jacobian[i, n]) * size_of_time(model, t)

@@ -69,15 +69,6 @@ def speed_displaced(model, transition, mode, t, x, distance, work):
 
 
 @njit(**KERNEL)
-def leads_to_guard(model, run, transition, mode, t, x, side, work):
-    """Whether the field on one side of a guard, as near as rounding, leads to the guard."""
-    value = guard_value(model, transition, t, x, work.scalar)
-    model.guard_gradient(transition, t, x, model.parameters, work.gradient)
-    distance = side * rounding_band(model, run, transition, t, x, work) - value
-    return speed_displaced(model, transition, mode, t, x, distance, work) * side < 0.0
-
-
-@njit(**KERNEL)
 def speed_beside(model, transition, mode, t, x, value, distance, work):
     """Speed of a guard beside ``x``, where its value is about ``distance``; zero if the guard jumps there.
 

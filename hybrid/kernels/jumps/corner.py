@@ -5,14 +5,12 @@ from numba import njit
 from hybrid.kernels.events.guards import (
     allowed,
     carry_rounding,
-    guard_value,
-    keep_grazing,
     widen_scale,
 )
 from hybrid.kernels.events.landing import land_beyond
 from hybrid.kernels.events.moments import Place
-from hybrid.kernels.events.onset import BY_SPEED, LATER, crosses_towards
-from hybrid.kernels.events.resolution import leads_to_guard, stays_on_guard, underflows
+from hybrid.kernels.events.onset import BY_SPEED, crosses_towards
+from hybrid.kernels.events.resolution import stays_on_guard, underflows
 from hybrid.kernels.events.sides import (
     FLOWED,
     LANDED,
@@ -155,33 +153,6 @@ def order_matters(model, method, run, one, other, work):
 
 
 @njit(**KERNEL)
-def is_turned_back(model, run, transition, before, work):
-    """Whether the flow only touches a guard that it has reached: soon it is back on the side ``before``.
-
-    The sides have just been taken. At the bottom of a dip that is no deeper than rounding either end may be
-    found first. If the speed leads back, and the field leads to the guard from both sides, the state comes to
-    rest there.
-    """
-    order, mode = run.on_guard[transition], run.mode
-    if run.side[transition] != before or order not in (BY_SPEED, LATER):
-        return False
-    return order == LATER or not leads_to_guard(model, run, transition, mode, run.phase, run.y, before, work)
-
-
-@njit(**KERNEL)
-def has_only_touched(model, run, record, fired, side, work):
-    """Whether the flow has only touched a guard, with the ``side`` beyond it; then a grazing is kept."""
-    t = run.phase
-    if not is_turned_back(model, run, fired, -side, work):
-        return False
-    if not allowed(model, fired, t, run.y, work.scalar):
-        return False
-    value = guard_value(model, fired, t, run.y, work.scalar)
-    keep_grazing(model, run, record, fired, t, run.y, value, work)
-    return True
-
-
-@njit(**KERNEL)
 def first_due(model, method, run, work):
     """The first transition that is due and allowed; whether it matters which one fires first is counted."""
     t, chosen, first, together, matters = run.phase, NO_TRANSITION, NO_TRANSITION, 0, False
@@ -207,32 +178,28 @@ def first_in_order(task, fired, stop_cycle, stop_phase):
     """Of the transitions due where the flow has reached the guard of ``fired``, the one listed first.
 
     The run lands beyond the guards of all that are due. Notes whether order matters. None if ``fired`` may
-    not fire or has only touched, and no other is due: the run then goes on from this point. What comes before
+    not fire, and no other is due: the run then goes on from this point. What comes before
     the guard there, and what comes after it, may differ by rounding alone, so its side is left to the next
     step: the crossing is behind, and cannot be found where it was refused.
     """
-    _, model, method, run, record, work = task_of(task)
+    _, model, method, run, _, work = task_of(task)
     mode = run.mode
     direction = model.direction[fired]
     beyond = direction if direction != 0 else -run.side[fired]
     land_beyond(model, run, fired, beyond, stop_cycle, stop_phase, work)
     flowed = Arrival(FLOWED, mode, NO_TRANSITION)
     take_sides(model, method, run, mode, run.phase, run.y, flowed, sides_of(run), work)
-    touched = has_only_touched(model, run, record, fired, beyond, work)
     run.side[fired] = beyond
     if run.on_guard[fired] == 0:
         run.on_guard[fired] = BY_SPEED
-    run.due[fired] = 0 if touched else 1
+    run.due[fired] = 1
     for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
         other = model.outgoing[slot]
         if run.due[other] == 1 and other != fired:
             land_beyond(model, run, other, run.side[other], stop_cycle, stop_phase, work)
     chosen = first_due(model, method, run, work)
-    if touched:
-        run.side[fired] = -beyond
-    elif chosen == NO_TRANSITION:
-        run.side[fired] = 0
     if chosen == NO_TRANSITION:
+        run.side[fired] = 0
         for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
             other = model.outgoing[slot]
             if run.due[other] == 1:
