@@ -81,10 +81,9 @@ def keep_error(i, error, size, work):
 @njit(**INLINE)
 def keep_error_of_series(model, path, work):
     """Keep how far the terms that a series leaves out may move the state at the end of its path."""
-    series, order, h = path.powers, path.degree, path.length
+    series, order = path.powers, path.degree
     for i in range(model.dimension):
-        size = max(abs(series[0, i]), abs(series[1, i] * h), abs(series[order + 1, i]))
-        keep_error(i, last_terms(series, i, order, h), size, work)
+        keep_error(i, last_terms(series, i, order, path.length), series[order + 2, i], work)
 
 
 @njit(**INLINE)
@@ -116,6 +115,19 @@ def moves_on(model, run, transition, path, work):
     return before * after > 0.0 and way > MARGIN * moved_by_error(model, work)
 
 
+@njit(**INLINE)
+def is_clear_in_column(path, column):
+    """Whether a guard that is a column of a series is farther from zero at both ends than its last terms.
+
+    What is less than the rounding of all its terms is no error.
+    """
+    powers, order = path.powers, path.degree
+    error = last_terms(powers, column, order, path.length)
+    if error <= ROUNDING_OF_STATE * EPSILON * powers[order + 2, column]:
+        return True
+    return min(abs(powers[0, column]), abs(powers[order + 1, column])) >= MARGIN * error
+
+
 @njit(**KERNEL)
 def is_resolved(model, run, transition, column, path, attempted, on_guard, work):
     """Whether the error of a step leaves the sign of a guard at both of its ends alone.
@@ -126,6 +138,8 @@ def is_resolved(model, run, transition, column, path, attempted, on_guard, work)
     asked = on_guard == 0 or (attempted and on_guard == BY_SPEED and run.since_entry == 0.0)
     if not asked or (not attempted and model.degree[run.mode] > 0):
         return True
+    if not attempted and column != NO_COLUMN:
+        return is_clear_in_column(path, column)
     if not attempted:
         keep_error_of_series(model, path, work)
     end_of(path, model.dimension, work.trial)

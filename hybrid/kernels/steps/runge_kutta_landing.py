@@ -1,7 +1,6 @@
 """Landing on an event of a Runge-Kutta step: the step is taken again up to its guard."""
 
 import math
-from typing import NamedTuple
 
 from numba import njit
 
@@ -11,9 +10,8 @@ from hybrid.kernels.events.onset import NO_ROOT, crosses_towards
 from hybrid.kernels.events.resolution import speed_displaced
 from hybrid.kernels.steps.step import attempt_again
 from hybrid.kernels.types.codes import NO_TRANSITION
-from hybrid.kernels.types.kinds import REAL, TRUTH
 from hybrid.kernels.types.layout import EPSILON
-from hybrid.kernels.types.options import INLINE, KERNEL
+from hybrid.kernels.types.options import KERNEL
 from hybrid.kernels.types.task import task_of
 
 # Below this share of the step, one Euler step completes a correction: the error left is its square.
@@ -62,63 +60,24 @@ def reach_any(task, h):
     return NOT_THERE, NO_TRANSITION
 
 
-class Lengths(NamedTuple):
-    """The lengths of a step between which its end passes a guard.
-
-    The guard has been seen on its side at ``low`` if ``before``, and not on it at ``high`` if ``after``.
-    """
-
-    low: REAL
-    high: REAL
-    before: TRUTH
-    after: TRUTH
-
-
-@njit(**INLINE)
-def narrowed(bracket, length, short):
-    """A bracket after a length that is too short, or long enough."""
-    low, high, before, after = bracket
-    if short:
-        return Lengths(length, high, True, after)
-    return Lengths(low, length, before, True)
-
-
-@njit(**KERNEL)
-def searched_at(bracket, begins, distance, h):
-    """The length at which the other side of a guard is searched, at a distance; with what is known then.
-
-    The length is ``NOT_THERE`` if no place is left. The guard is on its side at the start if it ``begins``
-    there.
-    """
-    low, high, before, after = bracket
-    length = low + distance if before else high - distance
-    if before and low < h <= length:
-        # The end of the step is the farthest place.
-        return h, bracket
-    if begins and after and length <= low:
-        # The start of the step is the farthest place on this side.
-        return 0.5 * high, Lengths(low, high, True, after)
-    return length if low < length < high else NOT_THERE, bracket
-
-
 @njit(**KERNEL)
 def land(task, transition, side, h, theta):
     """Shorten the step so that it ends on the guard, with the end in ``work.new``.
 
     The step is taken again up to the root of the interpolant and corrected by Newton's method on the guard,
     so that the state and the tangents at the event carry the error of the method, not that of its
-    interpolant. The guard comes from ``side``; Newton is kept in a bracket as soon as both sides have been
-    seen. Returns the length of the step last taken and the small Euler step that completed it; ``NOT_THERE``
-    instead of the length if the guard of the step, unlike that of its interpolant, only comes close to zero.
+    interpolant. The guard comes from ``side``; Newton is kept between the longest length before which it has
+    been seen there and the shortest behind which it has not. Returns the length of the step last taken and
+    the small Euler step that completed it; ``NOT_THERE`` instead of the length if the guard of the step,
+    unlike that of its interpolant, only comes close to zero.
     """
     _, model, method, run, _, work = task_of(task)
     t, s, rounding = run.phase, method.b.shape[0], measured_time(model, run, run.mode)
     begins = guard_value(model, transition, t, run.y, work.scalar) * side > 0.0
     # Along the step an affine guard is as smooth as the state. Other guards may have kinks, jumps and flat
-    # roots, and may cross more than once on the step. The ends of the step are then no bracket.
+    # roots, and may cross more than once on the step: its ends are no bracket.
     smooth = model.affine_guard[transition] == 1
-    after = smooth and guard_value(model, transition, t + h, work.new, work.scalar) * side <= 0.0
-    bracket = Lengths(0.0, h, smooth and begins, after)
+    low, high, before, after = 0.0, h, False, False
     length, last, reach = theta * h, math.inf, FIRST_REACH * h
     for trial in range(MOST_LANDINGS):
         attempt_again(task, length)
@@ -133,33 +92,34 @@ def land(task, transition, side, h, theta):
             for i in range(model.dimension * (1 + task.tangents)):
                 work.new[i] += correction * work.stages[s, i]
             return length, correction
-        # A guard that stays zero for a while changes its side at the end of that.
+        # A guard that stays zero for a while changes its side at the end of that. One without a value has not
+        # crossed yet if the interpolant crosses farther on.
         at_rest = not smooth and value == 0.0 and speed == 0.0
-        # A guard without a value has not crossed yet if the interpolant crosses farther on.
-        short = value * side > 0.0 or at_rest or (math.isnan(value) and length < theta * h)
-        bracket = narrowed(bracket, length, short)
-        low, high, closed = bracket.low, bracket.high, bracket.before and bracket.after
-        if closed and high - low <= 2.0 * EPSILON * (max(high, rounding) if smooth else high):
+        if value * side > 0.0 or at_rest or (math.isnan(value) and length < theta * h):
+            low, before = length, True
+        else:
+            high, after = length, True
+        if before and after and high - low <= 2.0 * EPSILON * max(high, rounding):
             if length != high:
                 attempt_again(task, high)
             return high, 0.0
-        newton = length + correction
-        slow = trial >= MOST_LANDINGS // 2 if smooth else trial > 2 and not abs(correction) <= 0.5 * last
+        newton, change = length + correction, abs(correction)
+        # A Newton step longer than the error of the interpolant follows another slope, that beside a jump.
+        trusted = (smooth or change <= MOST_CORRECTION * h) and (trial < 3 or change <= 0.5 * last)
         # A place that does not come from Newton's method gives no rate of convergence.
         last = 0.0
-        # A Newton step longer than the error of the interpolant follows another slope, that beside a jump.
-        trusted = smooth or abs(correction) <= MOST_CORRECTION * h
-        if low < newton < high and trusted and not slow:
-            length, last = newton, abs(correction)
-        elif closed:
+        if low < newton < high and trusted:
+            length, last = newton, change
+        elif before and after:
             length = 0.5 * (low + high)
-        elif smooth:
-            break
         else:
-            # Only one side is known: search the other side at growing distances.
-            length, bracket = searched_at(bracket, begins, reach, h)
-            reach *= 8.0
-            if length == NOT_THERE:
+            # Only one side is known: the other is searched at growing distances, up to an end of the step.
+            length, reach = (low + reach if before else high - reach), 8.0 * reach
+            if before and low < h <= length:
+                length = h
+            elif begins and length <= 0.0:
+                length, low, before = 0.5 * high, 0.0, True
+            elif not low < length < high:
                 break
     return NOT_THERE, 0.0
 
