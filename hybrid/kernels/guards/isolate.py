@@ -19,12 +19,11 @@ from hybrid.kernels.events.guards import (
     has_program,
     may_jump,
     rounding_band,
-    size_of_time,
     was_left_behind,
 )
 from hybrid.kernels.events.moments import Place, sign_along
 from hybrid.kernels.events.onset import AT_REST, BY_SPEED, LATER, NO_ROOT, crosses_towards, has_just_fired
-from hybrid.kernels.events.path import pace_at_start, rounding_of_start
+from hybrid.kernels.events.path import pace_at_start
 from hybrid.kernels.guards.form import (
     NO_COLUMN,
     WITHIN_ROUNDING,
@@ -168,10 +167,6 @@ def _later(model, run, path, guard, noise, work):
         pace = pace_at_start(path)
         if towards == guard.side and pace > 0.0:
             sure = moment / pace
-        elif jumps:
-            # By rounding the state may still be before the jump.
-            beyond = rounding_of_start(path, model.dimension, run.scale, size_of_time(model, t))
-            first = max(first, min(beyond, 0.5 * path.length))
     guard = Guard(
         transition,
         guard.column,
@@ -210,8 +205,7 @@ def _at_start(model, method, run, path, transition, column, work):
         returns = was_left_behind(model, run, transition, t, run.y, slope, side, work)
         return (_leaving_by_speed(guard, at), AT_START * path.length) if returns else (guard, 0.0)
     rooted = path.root > 1 and column != NO_COLUMN
-    if on_guard == BY_SPEED or (on_guard == LATER and rooted):
-        # The root of a guard that is zero without speed begins to grow like its variable, too.
+    if on_guard == BY_SPEED:
         return _leaving_by_speed(guard, at), AT_START * path.length
     # On an exact path noise is rounding, if no method that is not exact has led to its start. So is that of a
     # root, which grows like the variable.
