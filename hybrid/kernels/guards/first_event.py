@@ -69,7 +69,7 @@ def last_terms(series, column, order, h):
 @njit(**INLINE)
 def underflows_in_column(powers, column, order):
     """``underflows`` for a guard that is a column of the path."""
-    return max(abs(powers[0, column]), abs(powers[order + 1, column])) < UNDERFLOW
+    return 0.0 < max(abs(powers[0, column]), abs(powers[order + 1, column])) < UNDERFLOW
 
 
 @njit(**INLINE)

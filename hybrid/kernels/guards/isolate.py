@@ -129,6 +129,10 @@ def first_change(model, run, path, guard, first, work):
         at = form_at(model, path, guard, end, work)
         after = letter_of(at, guard.radius)
         if after == 0:
+            # A guard that has left zero, and returns to it at the end, is certain of its side on the way.
+            at = form_at(model, path, guard, 0.5 * (form.start + end), work)
+            if letter_of(at, guard.radius) * side > 0:
+                guard = _sure_at(guard, at, side)
             continue
         if after != side and side != 0:
             place = place_of_change(model, path, guard, form, end, work)

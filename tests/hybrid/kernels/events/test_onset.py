@@ -168,3 +168,16 @@ def test_a_rate_that_is_only_rounding_does_not_put_the_start_on_a_guard(length, 
     arc = simulate(system, (0.5 * length, -speed), span, mode="m", parameters=values, solver=solver)
     # The root of 0.5 - cos t - 2 (t - pi / 2), by Newton's method.
     assert arc.jumps.t == pytest.approx([2.05239432969], abs=1e-7)
+
+
+@pytest.mark.parametrize("solver", [Taylor(), DOP853(), Tsit5(), RadauIIA()])
+@pytest.mark.parametrize("speed", [0.5, 1.0, 3.0])
+def test_a_flight_from_the_floor_to_the_floor_lands_at_its_end(speed, solver):
+    """A run that begins and ends on its guard, both times to the last digit, fires it at the end."""
+    throw = HybridSystem(
+        state=("q", "v"),
+        modes=[Mode("flight", lambda t, x, p: (x.v, -1.0))],
+        transitions=[Transition("flight", None, Guard(lambda t, x, p: x.q, -1), name="land")],
+    )
+    arc = simulate(throw, (0.0, speed), (0.0, 2.0 * speed), solver=solver)
+    assert [jump.transition for jump in arc.jumps] == ["land"]
