@@ -24,7 +24,7 @@ from lyapunov.study.diagram import diagram, draw
 HERE = Path(__file__).parent
 README = HERE.parent / "README.md"
 PLAIN = HERE / "plain-equations.md"
-PLAIN = HERE / "plain-equations.md"
+OUTPUTS = HERE / "outputs.md"
 STYLE = {"font.size": 9, "axes.titlesize": 10, "axes.titlelocation": "left", "savefig.dpi": 160}
 
 
@@ -93,6 +93,12 @@ def split_picture(system: HybridSystem, folder: Path) -> None:
     save(figure, folder / "split_graph.png")
 
 
+def outputs_picture(system: HybridSystem, folder: Path) -> None:
+    """Height, force and energy of the soft contact."""
+    axes = plot_arc(simulate(system, (0.2, 0.0), (0.0, 1.0)), ["q", "force", "energy"], figsize=(6.4, 4.2))
+    save(axes.figure, folder / "outputs.png")
+
+
 def chart_picture(system: HybridSystem, folder: Path) -> None:
     """Sections and exponents over the forcing frequency, with the attractor followed from row to row."""
     with style():
@@ -146,6 +152,7 @@ def main() -> None:
         rattler_picture(system, folder)
         graph_picture(system, folder)
         split_picture(model_of(PLAIN, "oscillator"), folder)
+        outputs_picture(model_of(OUTPUTS, "ball"), folder)
         chart_picture(system, folder)
         branch_picture(folder)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property, partial
 from os import PathLike
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from hybrid import HybridSystem, arguments, sweep
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import silent
-from hybrid.errors import HybridError
+from hybrid.errors import ArgumentError, HybridError
 from hybrid.orbits.closing import advance_to_close
 from hybrid.simulation.trajectory import Common, Trajectory
 from hybrid.solvers import Solver
@@ -35,8 +35,18 @@ DIMS = {
     "standard_error": ("exponent",),
     "x_end": ("state",),
     "section": ("sample", "state"),
+    "section_outputs": ("sample", "output"),
 }
-RESULTS = ("exponents", "standard_error", "sum_rule", "jumps_per_interval", "x_end", "mode_end", "section")
+RESULTS = (
+    "exponents",
+    "standard_error",
+    "sum_rule",
+    "jumps_per_interval",
+    "x_end",
+    "mode_end",
+    "section",
+    "section_outputs",
+)
 
 
 @arguments.without_tolerances
@@ -55,6 +65,7 @@ def chart(
     solver: Solver | None = None,
     section: int = 0,
     at: At = None,
+    outputs: Iterable[str] = (),
     continue_from: str | None = None,
     store: str | PathLike[str] | None = None,
     executor: Any = None,
@@ -87,6 +98,8 @@ def chart(
     at
         Where the section is taken: by default once per forcing period; ``Guard(...)`` at each crossing of its
         surface; ``"jumps"`` at each jump, with the state before it.
+    outputs
+        Names of outputs to compute at the points of the section.
     continue_from
         Name of an axis along which the attractor is followed, or ``"previous"`` for the last axis. The first
         row starts from ``x0``, each other row from the end of the transient of the row before. A row starts
@@ -101,8 +114,8 @@ def chart(
     xarray.Dataset
         Over the axes of ``over``: ``exponents`` and ``standard_error`` with the axis ``exponent``,
         ``sum_rule``, ``jumps_per_interval``, the state ``x_end`` (axis ``state``) and mode ``mode_end`` at
-        the end of each row's spectrum, ``section`` (axes ``sample`` and ``state``), ``status`` and
-        ``message``. Rows that were not run hold nan.
+        the end of each row's spectrum, ``section`` (axes ``sample`` and ``state``), ``section_outputs`` (axes
+        ``sample`` and ``output``), ``status`` and ``message``. Rows that were not run hold nan.
 
     Raises
     ------
@@ -121,6 +134,11 @@ def chart(
     True
     """
     section = arguments.count("section", section, 0)
+    outputs = tuple(arguments.items("outputs", outputs, "be a list of names of outputs"))
+    if outputs and not section:
+        raise ArgumentError(
+            "outputs are computed at the points of a section, and this chart has none. Give section=100 too."
+        )
     rows = rows_of(
         system,
         over,
@@ -132,7 +150,8 @@ def chart(
         points=section,
         at=at,
         continue_from=continue_from,
-        results=(*RESULTS, "exponent", "sample", "state"),
+        results=(*RESULTS, "exponent", "sample", "state", "output"),
+        outputs=outputs,
     )
     task = Exponents(
         rows,
@@ -212,8 +231,7 @@ class Exponents:
             "jumps_per_interval": means.jumps_per_interval[row],
             "x_end": without_age(rows.system, trajectory.x),
             "mode_end": trajectory.mode,
-            # An axis of length zero could not be read back from a file.
-            **({"section": self._section(rows, point, trajectory, status)} if self.points else {}),
+            **(self._section(rows, point, trajectory, status) if self.points else {}),
             "status": status,
         }
 
@@ -274,9 +292,17 @@ class Exponents:
 
     def _section(
         self, rows: Rows, point: Mapping[str, float], trajectory: Trajectory, status: Status
-    ) -> np.ndarray:
+    ) -> dict[str, np.ndarray]:
+        """The points of the section, and outputs at them, by the names of the results."""
+        states, outputs = self._points(rows, point, trajectory, status)
+        # An axis of length zero could not be read back from a file.
+        return {"section": states, **({"section_outputs": outputs} if rows.outputs else {})}
+
+    def _points(
+        self, rows: Rows, point: Mapping[str, float], trajectory: Trajectory, status: Status
+    ) -> tuple[np.ndarray, np.ndarray]:
         if not status.ok:
-            return np.full((self.points, rows.system.dimension), np.nan)
+            return rows.no_section(self.points)
         if rows.marked is not rows.system:
             # The system with the surface goes on from here; with a period the phase is all of the time.
             place, now = (trajectory.x, trajectory.mode), float(trajectory.run.phase)
@@ -284,9 +310,9 @@ class Exponents:
             try:
                 marked = rows.go_on(point, place, rows.common(system, None, now))
             except HybridError:
-                return np.full((self.points, rows.system.dimension), np.nan)
+                return rows.no_section(self.points)
             marked.goes_on_from(trajectory)
-            found, _ = rows.section(marked, self.points)
+            found = rows.section(marked, self.points)
             marked.release()
             return found
-        return rows.section(trajectory, self.points)[0]
+        return rows.section(trajectory, self.points)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from hybrid import ArgumentError, HybridArc, StatusCode, arguments
 from hybrid.display.tables import with_unit
 from hybrid.plot import DATASETS, drawn
+from hybrid.plot.datasets import SECTION, column, column_label, column_name
 from hybrid.plot.style import Rows, as_component, axes_for, dot_area, mark, small_legend, told
 from hybrid.simulation.labelled import Names
 from lyapunov.compare import ModelComparison
@@ -240,7 +241,7 @@ def plot_bifurcation(
     chart
         From :func:`lyapunov.chart`, over one axis and with ``section=``.
     component
-        Name of the state component to show; by default the first.
+        Name of the component to show, or of an output that the chart has; by default the first component.
     ax
         Axes to draw into; by default those of a new figure.
     figsize
@@ -269,17 +270,15 @@ def plot_bifurcation(
     points = chart.sizes.get("sample", 0)
     if points == 0:
         raise ArgumentError("chart must have section points; this one has none. Compute it with section=100.")
-    names = _state_names(chart)
-    i = 0 if component is None else as_component("component", names, component)
-    across, up = np.repeat(values, points), chart.section.values[:, :, i].ravel()
+    shown, up = column("component", chart, 0 if component is None else component, SECTION)
+    across, up = np.repeat(values, points), up.ravel()
     area = dot_area(len(up), size)
     (ax,) = axes_for(ax, 1, FIGURE, figsize)
     ax.scatter(across, up, s=area, color=COLOURS[0], linewidths=0, rasterized=True)
     ax.set_xlabel(label_of(chart, name))
     if _mark_failures(ax, chart, values):
         small_legend(ax)
-    units = chart["unit"].values if "unit" in chart.coords else [""] * len(names)
-    ax.set_ylabel(with_unit(names[i], str(units[i])))
+    ax.set_ylabel(column_label(chart, shown))
     return ax
 
 
@@ -299,7 +298,8 @@ def plot_chart(
         From :func:`lyapunov.chart`. A chart over one axis with ``section=`` also gets the bifurcation
         diagram.
     component
-        Name of the state component in the diagram; by default the first.
+        Name of the component in the diagram, or of an output that the chart has; by default the first
+        component.
     ax
         Axes to draw into, two if the chart has a section and one axis, else one; by default those of a new
         figure.
@@ -331,7 +331,7 @@ def plot_chart(
     if size is not None:
         dot_area(1, size)
     if component is not None:
-        as_component("component", _state_names(as_chart(chart)), component)
+        column_name("component", as_chart(chart), component, SECTION[1])
     if len(axes_of(as_chart(chart))) > 1:
         two_axes(chart)
         axes = axes_for(ax, 1, (5.6, 4.4), figsize)
@@ -346,10 +346,6 @@ def plot_chart(
         plot_bifurcation(chart, component, ax=axes[0], size=size).set_xlabel("")
         plot_exponents(chart, ax=axes[1])
     return axes
-
-
-def _state_names(chart: xarray.Dataset) -> tuple[str, ...]:
-    return tuple(map(str, chart.state.values))
 
 
 def _only_axis(chart: xarray.Dataset) -> tuple[str, np.ndarray]:

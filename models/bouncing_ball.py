@@ -16,6 +16,7 @@ def bouncing_ball() -> HybridSystem:
     -------
     HybridSystem
         State ``q`` (height, m), ``v`` (velocity, m/s); mode ``flight``; transition ``bounce``.
+        Output: ``energy`` per mass, J/kg.
         Parameters: ``g = 9.81`` m/s^2; ``e = 0.8``, the coefficient of restitution, ``0 <= e <= 1``.
 
     Notes
@@ -46,7 +47,7 @@ def bouncing_ball() -> HybridSystem:
         name="bouncing ball",
         state=("q", "v"),
         parameters={"g": 9.81, "e": 0.8},
-        units={"q": "m", "v": "m/s", "t": "s", "g": "m/s^2"},
+        units={"q": "m", "v": "m/s", "t": "s", "g": "m/s^2", "energy": "J/kg"},
         modes=[Mode("flight", _flight)],
         transitions=[
             Transition(
@@ -57,9 +58,10 @@ def bouncing_ball() -> HybridSystem:
                 name="bounce",
             )
         ],
+        outputs={"energy": _energy},
         laws=Laws(
             invariant={"height": _height},
-            dissipated={"energy": _energy},
+            dissipated=["energy"],
             across={"bounce": {"restitution": _restitution}},
         ),
     )

@@ -18,7 +18,8 @@ RUN = {**MODEL, "solver": None}
 LONG = {**RUN, "t0": 0.0, "progress": False}
 TOLERANCES = {"rtol": 1e-10, "atol": 1e-12, "max_step": float("inf"), "max_steps": 10**9}
 CHECKING = {"rtol": 1e-12, "atol": 1e-14, "max_step": float("inf"), "max_steps": 20_000}
-PLAIN = {"parameters": None, "period": None, "name": "", "units": None, "angles": None, "laws": None}
+SYSTEM = {"period": None, "name": "", "units": None, "angles": None, "outputs": None, "laws": None}
+PLAIN = {"parameters": None, **SYSTEM}
 SEARCH = {
     **{**LONG, "progress": None, "section": None, "interval": None, "periods": 1000, "recurrences": 10},
     "tolerance": 0.01,
@@ -57,7 +58,7 @@ DEFAULTS = {
     hybrid.continue_orbit: {"solver": None, "max_steps": 2000, "progress": None},
     hybrid.continue_bifurcation: {"solver": None, "max_steps": 500, "progress": None},
     hybrid.open_branch: {},
-    hybrid.filippov: {"start": None, "period": None, "name": "", "units": None, "angles": None, "laws": None},
+    hybrid.filippov: {"start": None, **SYSTEM},
     hybrid.from_equations: PLAIN,
     hybrid.Laws: {
         **dict.fromkeys(
@@ -70,7 +71,9 @@ DEFAULTS = {
         **{**RUN, "tangent": None, "samples": None, "keep_jumps": None, "max_jumps": 100_000},
         "sensitivities": (),
     },
-    hybrid.simulate_many: {**RUN, "samples": None, "max_jumps": 100_000, "executor": None, "progress": None},
+    hybrid.simulate_many: {
+        **{**RUN, "samples": None, "outputs": (), "max_jumps": 100_000, "executor": None, "progress": None},
+    },
     hybrid.periodic_orbit: {
         **RUN,
         **{"t0": 0.0, "periods": 1, "period": None, "tolerance": 1e-10, "max_iterations": 30},
@@ -81,7 +84,7 @@ DEFAULTS = {
     hybrid.sweep: {"store": None, "executor": None, "progress": None},
     lyapunov.chart: {
         **{**LONG, "progress": None, "k": 1, "intervals": 1000, "interval": None, "transient": 200},
-        **{"section": 0, "at": None, "continue_from": None, "store": None, "executor": None},
+        **{"section": 0, "at": None, "outputs": (), "continue_from": None, "store": None, "executor": None},
     },
     lyapunov.compare_models: {
         **RUN,

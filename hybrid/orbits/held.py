@@ -15,7 +15,6 @@ from hybrid.orbits.newton import Departure, Shot
 from hybrid.system.derivatives import evaluate
 from hybrid.system.elements import Function
 from hybrid.system.graph import HybridSystem, laws_of
-from hybrid.system.laws import Law
 
 # Step of the central differences for gradients, as a share of the state: their two errors are equal there.
 STEP = float(np.finfo(float).eps) ** (1 / 3)
@@ -25,7 +24,8 @@ STEP = float(np.finfo(float).eps) ** (1 / 3)
 class Quantity:
     """A conserved quantity with its gradient ``(n + m + 1,)``, of which None is known if it is not traced."""
 
-    law: Law
+    name: str
+    function: Function
     gradient: Function | None
 
 
@@ -60,13 +60,13 @@ class Held:
     @property
     def names(self) -> list[str]:
         """The names of the quantities."""
-        return [each.law.name for each in self.quantities]
+        return [each.name for each in self.quantities]
 
     def in_mode(self, mode: str) -> Held | None:
         """The same quantities by the formulas of another mode; None if no one has any there."""
         known = dict(zip(self.names, self.values, strict=True))
         found = _quantities(self.system, mode, known)
-        values = np.array([known[each.law.name] for each in found])
+        values = np.array([known[each.name] for each in found])
         return attrs.evolve(self, quantities=found, values=values) if found else None
 
     def kept(
@@ -115,8 +115,7 @@ class Held:
     def _at(self, t: float, x: np.ndarray, parameters: np.ndarray) -> np.ndarray:
         whole, variables = np.append(x, self.counters), self.system.variables
         found = [
-            evaluate(variables, each.law.function, t, whole, parameters, finite=False)
-            for each in self.quantities
+            evaluate(variables, each.function, t, whole, parameters, finite=False) for each in self.quantities
         ]
         return np.array([np.nan if each is None else each[0] for each in found])
 
@@ -169,13 +168,14 @@ def _quantities(
         return ()
     within = system.modes[system.mode_index(mode)]
     return tuple(
-        Quantity(law, _gradient(system, law))
+        Quantity(law.name, function, _gradient(system, function))
         for law in laws_of(system).conserved
-        if law.holds_in(within.name, within.part_of) and (names is None or law.name in names)
+        if (function := law.in_mode(within.name, within.part_of)) is not None
+        and (names is None or law.name in names)
     )
 
 
-def _gradient(system: HybridSystem, law: Law) -> Function | None:
+def _gradient(system: HybridSystem, function: Function) -> Function | None:
     """The derivatives of a quantity in the state, the parameters and the time, if it can be traced."""
     from hybrid.expression.derivatives import jacobian_of
     from hybrid.expression.evaluation import expressed
@@ -184,7 +184,7 @@ def _gradient(system: HybridSystem, law: Law) -> Function | None:
     names = system.variables.parameter_names
     symbols = model_symbols(system.dimension, len(names))
     try:
-        expressions = trace(law.function, system.variables.components, names)
+        expressions = trace(function, system.variables.components, names)
     except TraceError:
         return None
     [row] = jacobian_of(expressions, [*symbols.x, *symbols.p, symbols.t])

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybrid.display.tables import html_table, with_unit
-from hybrid.simulation.labelled import Names, attributes, with_counters
+from hybrid.simulation.labelled import Names, attributes, with_counters, with_outputs
+from hybrid.simulation.quantities import table_of
 from hybrid.status import StatusCode
+from hybrid.system.graph import HybridSystem
 
 if TYPE_CHECKING:
     import xarray
@@ -32,10 +35,26 @@ def labelled_orbit(orbit: Any) -> xarray.Dataset:
         "iterations": orbit.iterations,
     }
     made_by = attributes("periodic orbit", orbit.status, orbit.system, orbit.parameters)
-    return xarray.Dataset(
+    found = xarray.Dataset(
         variables,
         names.coords(),
         {**made_by, "signature": list(orbit.signature), "transitions": list(orbit.transitions)},
+    )
+    [row] = table_at(orbit.system, [*orbit.system.outputs], [orbit])
+    return with_outputs(found, orbit.system, {"outputs": ((), row)})
+
+
+def table_at(system: HybridSystem, names: Sequence[str], orbits: Sequence[Any]) -> np.ndarray:
+    """Components and outputs at the points of orbits, ``(N, len(names))``."""
+    if not orbits:
+        return np.empty((0, len(names)))
+    return table_of(
+        system,
+        names,
+        np.array([each.t0 for each in orbits]),
+        np.array([each.x0 for each in orbits]),
+        np.array([system.mode_index(each.mode) for each in orbits]),
+        np.array([system.parameter_values(each.parameters) for each in orbits]),
     )
 
 

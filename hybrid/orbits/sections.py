@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -18,8 +18,9 @@ from hybrid.kernels.types import codes
 from hybrid.kernels.types.codes import UNLIMITED
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
-from hybrid.simulation.labelled import Names, attributes
+from hybrid.simulation.labelled import Names, attributes, with_outputs
 from hybrid.simulation.memory import empty_record
+from hybrid.simulation.quantities import mode_indices, quantity, table_of
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
@@ -38,12 +39,12 @@ STEPS_BETWEEN_POINTS = 1_000_000
 
 @attrs.frozen(eq=False, repr=False)
 class Section:
-    """Points of an orbit on a section.
+    """Points of an orbit on a section; ``section["q"]`` is a component of the state, or an output, over them.
 
     Attributes
     ----------
-    state_names, mode_names
-        Those of the system, for reports and pictures.
+    system, parameters
+        The model, and the values of all its parameters in the run, by name.
     t
         Times ``(N,)``.
     x
@@ -54,8 +55,6 @@ class Section:
         Jumps since the previous point ``(N,)``, without the crossings of the section.
     status
         How the run ended.
-    units
-        Units by name, where the system has them.
 
     Examples
     --------
@@ -65,32 +64,51 @@ class Section:
     ((50, 2), (50,))
     """
 
-    state_names: tuple[str, ...]
-    mode_names: tuple[str, ...]
+    system: HybridSystem
+    parameters: Mapping[str, float]
     t: np.ndarray
     x: np.ndarray
     mode: np.ndarray
     jumps: np.ndarray
     status: Status
-    units: Mapping[str, str] = attrs.field(factory=dict)
 
     def __len__(self) -> int:
         return len(self.t)
 
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A component of the state or an output at the points, ``(N,)``.
+
+        An output is nan in modes in which it has no value.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no component and no output of that name.
+        """
+        return self._table([quantity("", name, self.system)])[:, 0]
+
+    def _table(self, names: Iterable[str]) -> np.ndarray:
+        modes, values = mode_indices(self.system, self.mode), self.system.parameter_values(self.parameters)
+        return table_of(self.system, [*names], self.t, self.x, modes, values)
+
     def to_xarray(self) -> xarray.Dataset:
-        """The points over the axis ``sample``: ``x`` (axes ``sample`` and ``state``), ``mode``, ``jumps``."""
+        """The points over the axis ``sample``: ``x`` (axes ``sample`` and ``state``), ``mode``, ``jumps``.
+
+        If the system has outputs they are in ``outputs`` (axes ``sample`` and ``output``).
+        """
         import xarray
 
-        names = Names(self.state_names, self.units)
-        return xarray.Dataset(
+        names = Names(self.system.state_names, self.system.units)
+        found = xarray.Dataset(
             {
                 "x": (("sample", "state"), self.x, names.states),
                 "mode": ("sample", self.mode),
                 "jumps": ("sample", self.jumps),
             },
             {"t": ("sample", self.t, names.of("t")), **names.coords()},
-            attributes("section", self.status),
+            attributes("section", self.status, self.system, self.parameters),
         )
+        return with_outputs(found, self.system, {"outputs": ("sample", self._table(self.system.outputs))})
 
     def __repr__(self) -> str:
         return f"<Section of {counted(len(self), 'point')}, {self.status.brief}>"
@@ -162,14 +180,13 @@ def stroboscopic_section(
     status = status_of(trajectory, code)
     trajectory.release()
     return Section(
-        state_names=system.state_names,
-        mode_names=system.mode_names,
+        system=system,
+        parameters=trajectory.named_parameters,
         t=cycle * trajectory.model.period + trajectory.phase0,
         x=states,
         mode=np.array(system.mode_names)[index],
         jumps=np.diff(count, prepend=before),
         status=status,
-        units=dict(system.units),
     )
 
 
@@ -265,23 +282,22 @@ def poincare_section(
     marked = with_section(as_system("system", system), section)
     trajectory = start(marked, x0, t0, mode=mode, parameters=parameters, solver=solver)
     with trajectory.stop, progress_bar(transient + points, "Section", progress, "point") as bar:
-        return _collect(trajectory, len(system.modes), transient, points, bar)
+        return _collect(trajectory, system, transient, points, bar)
 
 
-def _collect(trajectory: Trajectory, markers: int, transient: int, points: int, bar: Any) -> Section:
-    counted = np.arange(len(trajectory.system.transitions)) < markers
+def _collect(trajectory: Trajectory, system: HybridSystem, transient: int, points: int, bar: Any) -> Section:
+    """The points of a run of a system with markers, which come first, as those of the system without."""
+    counted = np.arange(len(trajectory.system.transitions)) < len(system.modes)
     t, x, index, count, code = crossings(trajectory, counted, transient + points, bar)
     keep = slice(transient, None)
-    system = trajectory.system
     return Section(
-        state_names=system.state_names,
-        mode_names=system.mode_names,
+        system=system,
+        parameters=trajectory.named_parameters,
         t=t[keep],
         x=x[keep],
         mode=np.array(system.mode_names)[index[keep]],
         jumps=np.diff(count, prepend=0)[keep],
         status=status_of(trajectory, code),
-        units=dict(system.units),
     )
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybrid import arguments
-from hybrid.plot.style import Rows, as_component, axes_for, colour_of, legend, plain
+from hybrid.plot.style import Rows, axes_for, colour_of, legend, named_quantity, plain
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.labelled import Names
+from hybrid.simulation.quantities import table_of
+from hybrid.system.graph import HybridSystem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,28 +30,28 @@ def plot_arc(
     ax: Axes | Iterable[Axes] | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Rows:
-    """Draw an arc over time: one row per component, one colour per mode, dotted lines for resets.
+    """Draw an arc over time: one row per component or output, one colour per mode, dotted lines for resets.
 
     Parameters
     ----------
     arc
         From :func:`hybrid.simulate`; its dense output, if it has one, refines the curves between the steps.
     components
-        Names or indices of the state's components; by default all.
+        Names or indices of the state's components, or names of outputs; by default all components.
     ax
-        Axes to draw into, one per component; by default those of a new figure.
+        Axes to draw into, one per row; by default those of a new figure.
     figsize
         Width and height of a new figure in inches.
 
     Returns
     -------
     numpy.ndarray
-        The axes, one per component; ``.figure`` is their figure.
+        The axes, one per row; ``.figure`` is their figure.
 
     Raises
     ------
     ArgumentError
-        If a component does not exist, or the number of axes differs from the number of components.
+        If a name does not exist, or the number of axes differs from the number of rows.
 
     Examples
     --------
@@ -60,25 +62,24 @@ def plot_arc(
     >>> ax.get_xlabel(), ax.get_ylabel()
     ('t (s)', 'q (m)')
     """
-    names = _as_arc(arc).system.state_names
-    chosen = range(len(names)) if components is None else _components(names, components)
+    system = _as_arc(arc).system
+    chosen = list(system.state_names) if components is None else _names(system, components)
     axes = axes_for(ax, len(chosen), figsize=figsize)
-    labels = Names(names, arc.system.units)
-    lines = curves(arc)
-    for row, i in zip(axes, chosen, strict=True):
-        for mode, (t, x) in lines.items():
-            row.plot(t, x[:, i], color=colour_of(mode), linewidth=1.4, solid_capstyle="round")
+    labels = Names(system.state_names, system.units)
+    lines = curves(arc, chosen)
+    for i, (row, name) in enumerate(zip(axes, chosen, strict=True)):
+        for mode, (t, values) in lines.items():
+            row.plot(t, values[:, i], color=colour_of(mode), linewidth=1.4, solid_capstyle="round")
         if arc.keeps_jumps:
-            t = np.repeat(arc.jumps.t, 3)
-            ends = _with_gaps(arc.jumps.x_minus[:, i], arc.jumps.x_plus[:, i])
+            t, ends = np.repeat(arc.jumps.t, 3), _over_jumps(arc, name)
             row.plot(t, ends, color=JUMP_COLOUR, linewidth=0.9, linestyle=":", zorder=1)
         _shade(row, lines)
-        row.set_ylabel(labels.label(names[i]))
+        row.set_ylabel(labels.label(name))
         row.margins(x=0)
         plain(row)
     if len(axes):
         axes[-1].set_xlabel(labels.label("t"))
-        legend(axes[0], arc.system.mode_names, lines)
+        legend(axes[0], system.mode_names, lines)
     return axes
 
 
@@ -90,14 +91,16 @@ def plot_phase(
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Axes:
-    """Draw one component of an arc over another: one colour per mode, jumps dashed, a dot at the start.
+    """Draw an arc in the plane of two components or outputs: one colour per mode, jumps dashed.
+
+    A dot marks the start.
 
     Parameters
     ----------
     arc
         From :func:`hybrid.simulate`; its dense output, if it has one, refines the curves between the steps.
     x, y
-        Names or indices of the state's components.
+        Names or indices of the state's components, or names of outputs.
     ax
         Axes to draw into; by default those of a new figure.
     figsize
@@ -110,7 +113,7 @@ def plot_phase(
     Raises
     ------
     ArgumentError
-        If a component does not exist.
+        If a name does not exist.
 
     Examples
     --------
@@ -121,29 +124,22 @@ def plot_phase(
     >>> ax.get_xlabel(), ax.get_ylabel()
     ('q (m)', 'v (m/s)')
     """
-    names = _as_arc(arc).system.state_names
-    i, j = as_component("x", names, x), as_component("y", names, y)
+    system = _as_arc(arc).system
+    across, up = (named_quantity("x", system, x), named_quantity("y", system, y))
     (ax,) = axes_for(ax, 1, (5.0, 4.2), figsize)
-    labels = Names(names, arc.system.units)
-    lines = curves(arc)
-    for mode, (_, states) in lines.items():
-        ax.plot(states[:, i], states[:, j], color=colour_of(mode), linewidth=1.4, solid_capstyle="round")
+    labels = Names(system.state_names, system.units)
+    lines = curves(arc, (across, up))
+    for mode, (_, values) in lines.items():
+        ax.plot(*values.T, color=colour_of(mode), linewidth=1.4, solid_capstyle="round")
     if arc.keeps_jumps:
-        before, after = arc.jumps.x_minus, arc.jumps.x_plus
-        ax.plot(
-            _with_gaps(before[:, i], after[:, i]),
-            _with_gaps(before[:, j], after[:, j]),
-            color=JUMP_COLOUR,
-            linewidth=0.9,
-            linestyle=(0, (4, 3)),
-            zorder=1,
-        )
+        ends = _over_jumps(arc, across), _over_jumps(arc, up)
+        ax.plot(*ends, color=JUMP_COLOUR, linewidth=0.9, linestyle=(0, (4, 3)), zorder=1)
     if len(arc.x):
-        ax.plot(arc.x[0, i], arc.x[0, j], "o", color="black", markersize=4)
-    ax.set_xlabel(labels.label(names[i]))
-    ax.set_ylabel(labels.label(names[j]))
+        ax.plot(arc[across][0], arc[up][0], "o", color="black", markersize=4)
+    ax.set_xlabel(labels.label(across))
+    ax.set_ylabel(labels.label(up))
     plain(ax)
-    legend(ax, arc.system.mode_names, lines)
+    legend(ax, system.mode_names, lines)
     return ax
 
 
@@ -151,61 +147,78 @@ def _as_arc(arc: object) -> HybridArc:
     return arguments.instance("arc", arc, HybridArc, "Make one with hybrid.simulate.")
 
 
-def _components(names: Sequence[str], components: object) -> list[int]:
-    wanted = "be names or indices of components of the state, at least one"
+def _names(system: HybridSystem, components: object) -> list[str]:
+    wanted = "be names or indices of components of the state, or names of outputs, at least one"
     given = arguments.items("components", components, wanted, least=1)
-    return [as_component("components", names, each) for each in given]
+    return [named_quantity("components", system, each) for each in given]
 
 
-def curves(arc: HybridArc) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-    """Times and states per visited mode, fine enough to draw; a row of nan ends each visit."""
+def curves(arc: HybridArc, names: Sequence[str]) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Times, and components and outputs ``(N, len(names))``, per visited mode; a row of nan ends each visit.
+
+    They are fine enough to draw.
+    """
     if not len(arc.t):
         return {}
-    t, x, visit = _refined(arc)
+    firsts = np.flatnonzero(np.diff(arc.j, prepend=arc.j[0] - 1))
+    visited = np.array([arc.system.mode_index(str(arc.mode[first])) for first in firsts])
+    values = arc.system.parameter_values(arc.parameters)
+
+    def table(t: np.ndarray, x: np.ndarray, visit: np.ndarray) -> np.ndarray:
+        return table_of(arc.system, names, t, x, visited[visit], values)
+
+    t, drawn, visit = _refined(arc, table)
     # The point after the last one of each visit is a gap.
     ends = np.flatnonzero(np.diff(visit, append=visit[-1] + 1)) + 1
-    firsts = np.flatnonzero(np.diff(arc.j, prepend=arc.j[0] - 1))
-    modes = np.array([arc.system.mode_index(str(arc.mode[first])) for first in firsts])[visit]
-    t, x = np.insert(t, ends, np.nan), np.insert(x, ends, np.nan, axis=0)
+    modes = visited[visit]
+    t, drawn = np.insert(t, ends, np.nan), np.insert(drawn, ends, np.nan, axis=0)
     modes = np.insert(modes, ends, modes[ends - 1])
-    return {int(mode): (t[modes == mode], x[modes == mode]) for mode in np.unique(modes)}
+    return {int(mode): (t[modes == mode], drawn[modes == mode]) for mode in np.unique(modes)}
 
 
-def _refined(arc: HybridArc) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times, states and visits (0, 1, ...), with dense output wherever the curve is not straight."""
+def _refined(
+    arc: HybridArc, table: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times, rows of a table and visits (0, 1, ...), with dense output wherever a curve is not straight."""
     visit = np.cumsum(np.diff(arc.j, prepend=arc.j[0]) != 0)
+    known = table(arc.t, arc.x, visit)
     if arc._pieces is None or len(arc.t) < 2:
-        return arc.t, arc.x, visit
+        return arc.t, known, visit
     inside = np.flatnonzero(np.diff(visit) == 0)
     part = np.arange(1, FIRST_PARTS) / FIRST_PARTS
     added = (arc.t[inside, None] + (arc.t[inside + 1] - arc.t[inside])[:, None] * part).ravel()
-    after = np.repeat(inside + 1, FIRST_PARTS - 1)
+    after, between = np.repeat(inside + 1, FIRST_PARTS - 1), np.repeat(visit[inside], FIRST_PARTS - 1)
     # Known points keep their states: at a jump, the dense output has only the state after it.
-    times, states = np.insert(arc.t, after, added), np.insert(arc.x, after, arc(added), axis=0)
-    visit = np.insert(visit, after, visit[after - 1])
-    size = np.ptp(arc.x, axis=0)
-    size[size == 0.0] = np.inf
+    times, rows = (
+        np.insert(arc.t, after, added),
+        np.insert(known, after, table(added, arc(added), between), axis=0),
+    )
+    visit = np.insert(visit, after, between)
+    with np.errstate(invalid="ignore"):
+        size = np.nanmax(known, axis=0, initial=-np.inf) - np.nanmin(known, axis=0, initial=np.inf)
+    size[~(size > 0.0)] = np.inf
     bent = np.diff(visit) == 0
     for _ in range(MOST_HALVINGS):
         pieces = np.flatnonzero(bent)
         middles = 0.5 * (times[pieces] + times[pieces + 1])
-        found = arc(middles)
-        straight = 0.5 * (states[pieces] + states[pieces + 1])
-        off = np.max(np.abs(found - straight) / size, axis=1) > SMOOTH
+        found = table(middles, arc(middles), visit[pieces])
+        straight = 0.5 * (rows[pieces] + rows[pieces + 1])
+        off = np.any(np.abs(found - straight) / size > SMOOTH, axis=1)
         where = pieces[off]
         if not len(where):
             break
         times = np.insert(times, where + 1, middles[off])
-        states = np.insert(states, where + 1, found[off], axis=0)
+        rows = np.insert(rows, where + 1, found[off], axis=0)
         visit = np.insert(visit, where + 1, visit[where])
         bent = np.zeros(len(times) - 1, dtype=bool)
         halves = where + np.arange(len(where))
         bent[halves] = bent[halves + 1] = True
-    return times, states, visit
+    return times, rows, visit
 
 
-def _with_gaps(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """``before, after, nan`` for each jump, so that one line draws all jumps."""
+def _over_jumps(arc: HybridArc, name: str) -> np.ndarray:
+    """``before, after, nan`` of each jump, so that one line draws all jumps."""
+    before, after = arc.jumps.before(name), arc.jumps.after(name)
     return np.column_stack([before, after, np.full(len(before), np.nan)]).ravel()
 
 

@@ -10,7 +10,9 @@ import numpy as np
 from hybrid import arguments
 from hybrid.orbits.continuation.branch import Branch
 from hybrid.orbits.continuation.continue_bifurcation import BifurcationCurve
-from hybrid.plot.style import COLOURS, as_component, axes_for, dot_area, small_legend
+from hybrid.orbits.labelled import table_at
+from hybrid.plot.datasets import SECTION, column
+from hybrid.plot.style import COLOURS, axes_for, dot_area, named_quantity, small_legend
 from hybrid.simulation.labelled import Names
 
 if TYPE_CHECKING:
@@ -42,7 +44,7 @@ def plot_branch(
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Axes:
-    """Draw a component of the orbits' points over the parameter, with the bifurcations.
+    """Draw a component or an output at the orbits' points over the parameter, with the bifurcations.
 
     Stable parts are full, unstable ones dashed.
 
@@ -51,7 +53,7 @@ def plot_branch(
     branch
         From :func:`hybrid.continue_orbit`.
     y
-        Name or index of the component; by default the first.
+        Name or index of the component, or name of the output; by default the first component.
     over
         A chart over the same parameter with points of the section, from ``lyapunov.chart(section=...)``,
         which is drawn below the branch; or the axes of a picture of one.
@@ -80,11 +82,11 @@ def plot_branch(
     """
     arguments.instance("branch", branch, Branch, "Make one with hybrid.continue_orbit.")
     system = branch.system
-    i = as_component("y", system.state_names, y)
+    name = named_quantity("y", system, y)
     cloud = None
     if over is not None:
         if hasattr(over, "data_vars"):
-            cloud = _points_of(over, branch.name, system.state_names[i])
+            cloud = _points_of(over, branch.name, name)
         elif ax is None and hasattr(over, "plot"):
             ax = over
         else:
@@ -93,16 +95,18 @@ def plot_branch(
     (ax,) = axes_for(ax, 1, (6.4, 4.2), figsize)
     if cloud is not None:
         ax.scatter(*cloud, s=dot_area(len(cloud[0])), color="0.6", linewidths=0, rasterized=True, zorder=0)
-    across, values = branch.parameter, branch.x0[:, i]
+    across, values = branch.parameter, branch[name]
     for stable, part in groupby(range(len(branch)), key=lambda k: bool(branch.stable[k])):
         inside = list(part)
         # The line reaches to the next part.
         shown = [*inside, *([inside[-1] + 1] if inside[-1] + 1 < len(branch) else [])]
         ax.plot(across[shown], values[shown], "-" if stable else "--", color=COLOURS[0], lw=1.4)
-    _mark(ax, [(each.kind, each.value, each.orbit.x0[i]) for each in branch.bifurcations])
+    found = branch.bifurcations
+    there = table_at(system, [name], [each.orbit for each in found])[:, 0]
+    _mark(ax, [(each.kind, each.value, up) for each, up in zip(found, there, strict=True)])
     names = Names(system.state_names, system.units)
     ax.set_xlabel(names.label(branch.name))
-    ax.set_ylabel(names.label(system.state_names[i]))
+    ax.set_ylabel(names.label(name))
     return ax
 
 
@@ -164,5 +168,5 @@ def _points_of(chart: Any, name: str, component: str) -> tuple[np.ndarray, np.nd
     points = chart.get("section")
     if points is None or name not in points.dims or points.sizes.get("sample", 0) == 0:
         raise arguments.refusal("over", f"be a chart over {name!r} alone, computed with section=100", chart)
-    values = points.sel(state=component).transpose(name, "sample").values
+    values = column("y", chart.transpose(name, "sample", ...), component, SECTION)[1]
     return np.repeat(np.asarray(points[name], dtype=float), values.shape[1]), values.ravel()

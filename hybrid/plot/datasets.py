@@ -9,7 +9,7 @@ import numpy as np
 from hybrid import arguments
 from hybrid.display.tables import with_unit
 from hybrid.errors import ArgumentError
-from hybrid.plot.orbits import second
+from hybrid.plot.orbits import beside
 from hybrid.plot.style import COLOURS, Rows, as_component, axes_for, dot_area, mark, plain, small_legend, told
 from hybrid.status import StatusCode
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 WHERE = ".message"
 FAILED_COLOUR = "#B2182B"
+# Variables with the states and the outputs of datasets.
+ENDS, SECTION = ("x_end", "outputs_end"), ("section", "section_outputs")
 
 
 def plot_ends(
@@ -30,15 +32,17 @@ def plot_ends(
     figsize: tuple[float, float] | None = None,
     size: float | None = None,
 ) -> Axes:
-    """Draw where many runs end, in the plane of two components: one colour per mode, crosses for failures.
+    """Draw where many runs end, in the plane of two components or outputs: one colour per mode.
+
+    Crosses are runs that failed.
 
     Parameters
     ----------
     ends
         From :func:`hybrid.simulate_many`.
     x, y
-        Names or indices of the components; by default the first two. The ends of a state with one component
-        are drawn over the starts.
+        Names or indices of components, or names of outputs that the dataset has; by default the first two
+        components. The ends of a state with one component are drawn over the starts.
     ax
         Axes to draw into; by default those of a new figure.
     figsize
@@ -67,14 +71,14 @@ def plot_ends(
     """
     if not {"x0", "x_end", "mode_end", "status"} <= set(getattr(ends, "data_vars", ())):
         raise arguments.refusal("ends", "be a dataset made with hybrid.simulate_many", ends)
-    names = tuple(map(str, ends.state.values))
-    i = as_component("x", names, x)
-    j = second(len(names), i) if y is None else as_component("y", names, y)
-    labels = [with_unit(name, unit) for name, unit in zip(names, _units(ends, names), strict=True)]
+    first, across = column("x", ends, x, ENDS)
+    other = beside([*map(str, ends.state.values)], first) if y is None else y
+    over = column_label(ends, first)
+    if other is None:
+        across, other, over = ends.x0.values[:, 0], first, f"start of {over}"
+    last, up = column("y", ends, other, ENDS)
     area = dot_area(ends.sizes["start"], size)
     (ax,) = axes_for(ax, 1, (5.0, 4.2), figsize)
-    states = ends.x_end.values
-    across, up = (ends.x0.values[:, i], states[:, i]) if j is None else (states[:, i], states[:, j])
     modes, good = ends.mode_end.values.astype(str), ends.status.values == StatusCode.SUCCESS
     for index, mode in enumerate(sorted(set(modes[good]))):
         there = good & (modes == mode)
@@ -83,8 +87,8 @@ def plot_ends(
     if not good.all():
         label = told(ends.status.values, WHERE)
         ax.scatter(across[~good], up[~good], s=25.0, color=FAILED_COLOUR, marker="x", label=label)
-    ax.set_xlabel(f"start of {labels[i]}" if j is None else labels[i])
-    ax.set_ylabel(labels[i if j is None else j])
+    ax.set_xlabel(over)
+    ax.set_ylabel(column_label(ends, last))
     plain(ax)
     if len(set(modes[good])) > 1 or not good.all():
         small_legend(ax)
@@ -216,6 +220,30 @@ def _axis_label(swept: xarray.Dataset, name: str) -> str:
     return with_unit(name, swept[name].attrs.get("units"))
 
 
-def _units(dataset: xarray.Dataset, names: tuple[str, ...]) -> list[str]:
-    """Units of the components of the state, empty where there are none."""
-    return [str(unit) for unit in dataset["unit"].values] if "unit" in dataset.coords else [""] * len(names)
+def column(
+    argument: str, dataset: xarray.Dataset, given: object, variables: tuple[str, str]
+) -> tuple[str, np.ndarray]:
+    """A component or an output by the name or index that the argument gives, and its values.
+
+    ``variables`` hold the states and the outputs of the dataset.
+    """
+    states, outputs = variables
+    name = column_name(argument, dataset, given, outputs)
+    of_state = name in dataset.state.values
+    found = dataset[states].sel(state=name) if of_state else dataset[outputs].sel(output=name)
+    return name, found.values
+
+
+def column_name(argument: str, dataset: xarray.Dataset, given: object, outputs: str) -> str:
+    """The name of a component, or of an output that the dataset holds in the variable ``outputs``."""
+    names = [*map(str, dataset.state.values)]
+    more = [*map(str, dataset.output.values)] if outputs in dataset.data_vars else []
+    return [*names, *more][as_component(argument, names, given, more)]
+
+
+def column_label(dataset: xarray.Dataset, name: str) -> str:
+    """The name of a component or an output with its unit, if the dataset has one."""
+    for axis, unit in (("state", "unit"), ("output", "output_unit")):
+        if unit in dataset.coords and name in dataset[axis].values:
+            return with_unit(name, str(dataset[unit].sel({axis: name}).values))
+    return name

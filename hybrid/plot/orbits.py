@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,8 +12,9 @@ from hybrid.orbits.labelled import unfinished
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.sections import Section
 from hybrid.plot.arcs import plot_phase
-from hybrid.plot.style import as_component, axes_for, check_axes, colour_of, dot_area, legend, plain
+from hybrid.plot.style import axes_for, check_axes, colour_of, dot_area, legend, named_quantity, plain
 from hybrid.simulation.labelled import Names
+from hybrid.system.graph import HybridSystem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,15 +29,15 @@ def plot_section(
     figsize: tuple[float, float] | None = None,
     size: float | None = None,
 ) -> Axes:
-    """Draw the points of a section in the plane of two components: one colour per mode.
+    """Draw the points of a section in the plane of two components or outputs: one colour per mode.
 
     Parameters
     ----------
     section
         From :func:`hybrid.stroboscopic_section` or :func:`hybrid.poincare_section`.
     x, y
-        Names or indices of the components; by default the first two. A state with one component is drawn
-        over time.
+        Names or indices of components, or names of outputs; by default the first two components. A state
+        with one component is drawn over time.
     ax
         Axes to draw into; by default those of a new figure.
     figsize
@@ -62,21 +64,20 @@ def plot_section(
     ('x', 'v')
     """
     arguments.instance("section", section, Section, "Make one with hybrid.stroboscopic_section.")
-    names = section.state_names
-    i = as_component("x", names, x)
-    j = second(len(names), i) if y is None else as_component("y", names, y)
+    system = section.system
+    first, other = plane_of(system, x, y)
     area = dot_area(len(section), size)
     (ax,) = axes_for(ax, 1, (5.0, 4.2), figsize)
-    across, up = (section.t, section.x[:, i]) if j is None else (section.x[:, i], section.x[:, j])
-    modes = section.mode_names
+    across, up = (section.t, section[first]) if other is None else (section[first], section[other])
+    modes = system.mode_names
     visited = [index for index, mode in enumerate(modes) if np.any(section.mode == mode)]
     for index in visited:
         there = section.mode == modes[index]
         colour = colour_of(index)
         ax.scatter(across[there], up[there], s=area, color=colour, linewidths=0, rasterized=True)
-    labels = Names(names, section.units)
-    ax.set_xlabel(labels.label("t" if j is None else names[i]))
-    ax.set_ylabel(labels.label(names[i] if j is None else names[j]))
+    labels = Names(system.state_names, system.units)
+    ax.set_xlabel(labels.label("t" if other is None else first))
+    ax.set_ylabel(labels.label(other or first))
     plain(ax)
     legend(ax, modes, visited)
     return ax
@@ -90,7 +91,7 @@ def plot_orbit(
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Axes:
-    """Draw a periodic orbit in the plane of two components, with its period and largest multiplier.
+    """Draw a periodic orbit in the plane of two components or outputs, with period and largest multiplier.
 
     Where the search did not converge the title says so, and has no multiplier.
 
@@ -99,7 +100,7 @@ def plot_orbit(
     orbit
         From :func:`hybrid.periodic_orbit`.
     x, y
-        Names or indices of the components; by default the first two.
+        Names or indices of components, or names of outputs; by default the first two components.
     ax
         Axes to draw into; by default those of a new figure.
     figsize
@@ -124,11 +125,9 @@ def plot_orbit(
     ('x', 'v')
     """
     arguments.instance("orbit", orbit, PeriodicOrbit, "Find one with hybrid.periodic_orbit.")
-    names = orbit.system.state_names
-    i = as_component("x", names, x)
-    j = second(len(names), i) if y is None else as_component("y", names, y)
+    first, other = plane_of(orbit.system, x, y)
     check_axes(ax)
-    ax = plot_phase(orbit.arc(), i, i if j is None else j, ax=ax, figsize=figsize)
+    ax = plot_phase(orbit.arc(), first, other or first, ax=ax, figsize=figsize)
     largest = orbit.multipliers[0]
     number = f"{largest.real:.4g}" if largest.imag == 0 else f"{largest:.4g}"
     period = f"{orbit.period:.6g} {orbit.system.units.get('t', '')}".rstrip()
@@ -139,8 +138,19 @@ def plot_orbit(
     return ax
 
 
-def second(dimension: int, first: int) -> int | None:
-    """The component to draw over the component ``first``; None if there is no other."""
-    if dimension == 1:
+def plane_of(system: HybridSystem, x: str | int, y: str | int | None) -> tuple[str, str | None]:
+    """What is drawn across and up; without ``y`` the component beside ``x``, or None if there is no other."""
+    first = named_quantity("x", system, x)
+    if y is not None:
+        return first, named_quantity("y", system, y)
+    return first, beside(system.state_names, first)
+
+
+def beside(names: Sequence[str], first: str) -> str | None:
+    """The component to draw over another one, or over an output; None if there is no other."""
+    if first not in names:
+        return names[0]
+    if len(names) == 1:
         return None
-    return first + 1 if first + 1 < dimension else first - 1
+    i = names.index(first)
+    return names[i + 1 if i + 1 < len(names) else i - 1]

@@ -9,7 +9,9 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.errors import ArgumentError
+from hybrid.simulation.quantities import words_for
 from hybrid.status import StatusCode
+from hybrid.system.graph import HybridSystem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,8 +24,11 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 LARGEST_DOT = 1000.0
 
 
-def as_component(name: str, names: Sequence[str], component: object) -> int:
-    """Index of a component of the state, given by name or index in the argument ``name``."""
+def as_component(name: str, names: Sequence[str], component: object, outputs: Iterable[str] = ()) -> int:
+    """Index in ``(*names, *outputs)`` of what the argument ``name`` gives.
+
+    Components of the state are given by name or index, outputs by name.
+    """
     index = arguments.whole_number(component)
     if index is not None:
         if not -len(names) <= index < len(names):
@@ -32,9 +37,14 @@ def as_component(name: str, names: Sequence[str], component: object) -> int:
                 f"{len(names)} components."
             )
         return index % len(names)
-    return list(names).index(
-        arguments.known(f"{name}: State component", component, names, "State components")
-    )
+    both = [*names, *outputs]
+    what, kind = words_for(len(both) > len(names))
+    return both.index(arguments.known(f"{name}: {what}", component, both, kind))
+
+
+def named_quantity(argument: str, system: HybridSystem, given: object) -> str:
+    """The name of a component, which may be given by its index, or of an output."""
+    return system.quantity_names[as_component(argument, system.state_names, given, system.outputs)]
 
 
 def check_axes(ax: object, figsize: object = None) -> None:

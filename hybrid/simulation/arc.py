@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from html import escape
 from operator import attrgetter
@@ -16,8 +16,9 @@ from hybrid import arguments
 from hybrid.display.tables import counted, html_table
 from hybrid.errors import ArgumentError
 from hybrid.simulation.jumps import Grazing, Jumps, Sensitivities, known
-from hybrid.simulation.labelled import Names, attributes, with_counters
+from hybrid.simulation.labelled import Names, attributes, with_counters, with_outputs
 from hybrid.simulation.points import Pieces, Samples, Steps
+from hybrid.simulation.quantities import quantity, slopes_of, table_of, values_of
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
 
@@ -39,7 +40,7 @@ MADE_LATER = {
 
 @attrs.frozen(eq=False, repr=False, slots=False)
 class HybridArc:
-    """A solution over hybrid time ``(t, j)``; ``arc["q"]`` is one component of the state over it.
+    """A solution over hybrid time ``(t, j)``; ``arc["q"]`` is one component of the state, or an output.
 
     Without ``samples`` the points are the solver's own: both sides of every jump and the ends of every step.
     With ``samples`` the points are at those times; at a jump, the state is the one after it.
@@ -163,6 +164,57 @@ class HybridArc:
         """Derivatives ``(N, n, n)`` of the samples in the start; as ``sensitivity``."""
         return self._sampled()[:, :, : self.system.tangent_dimension]
 
+    def fundamental_of(self, name: str) -> np.ndarray:
+        """Derivatives ``(k,)`` of a component or an output at the end along the tangent vectors.
+
+        Those of an output are ``D_x h`` times ``fundamental``.
+
+        Raises
+        ------
+        ArgumentError
+            If the run had no tangent vectors, or there is no such name.
+        """
+        quantity("name: ", name, self.system)
+        if self.fundamental is None:
+            raise ArgumentError("This arc has no tangent vectors. Run simulate with tangent=True.")
+        return self._along(name, self.fundamental[None], slice(-1, None))[0]
+
+    def sensitivity_of(self, name: str) -> np.ndarray:
+        """Derivatives ``(m,)`` of a component or an output at the end in the parameters; as ``sensitivity``.
+
+        Those of an output are ``D_x h`` times ``sensitivity``, plus ``D_p h``.
+
+        Raises
+        ------
+        ArgumentError
+            If the run had no ``sensitivities``, or there is no such name.
+        """
+        return self._in_parameters(name, self.sensitivity[None], slice(-1, None))[0]
+
+    def sampled_fundamental_of(self, name: str) -> np.ndarray:
+        """Derivatives ``(N, n)`` of a component or an output at the samples in the start."""
+        return self._along(name, self.sampled_fundamental)
+
+    def sampled_sensitivity_of(self, name: str) -> np.ndarray:
+        """Derivatives ``(N, m)`` of a component or an output at the samples in the parameters."""
+        return self._in_parameters(name, self.sampled_sensitivity)
+
+    def _along(self, name: str, tangents: np.ndarray, points: slice = slice(None)) -> np.ndarray:
+        """Derivatives ``(N, k)`` of a name along tangent vectors ``(N, n, k)`` at points of the arc."""
+        slopes = self._slopes(name, points)[:, : self.system.tangent_dimension]
+        return np.einsum("ij,ijk->ik", slopes, tangents)
+
+    def _in_parameters(self, name: str, tangents: np.ndarray, points: slice = slice(None)) -> np.ndarray:
+        own = [*self.system.parameters]
+        places = [self.system.dimension + own.index(each) for each in known(self._sensitivities).names]
+        return self._along(name, tangents, points) + self._slopes(name, points)[:, places]
+
+    def _slopes(self, name: str, points: slice) -> np.ndarray:
+        """Derivatives ``(N, n + m)`` of a name in the state and in the parameters."""
+        quantity("name: ", name, self.system)
+        places = self.t[points], self.x[points], self._mode_index[points]
+        return slopes_of(self.system, name, *places, self._values)
+
     def _sampled(self) -> np.ndarray:
         found = known(self._sensitivities)
         if found.samples is None:
@@ -187,9 +239,9 @@ class HybridArc:
     def to_xarray(self) -> xarray.Dataset:
         """The points of the arc over time: ``x`` (axes ``t`` and ``state``), ``j``, ``mode``.
 
-        Without ``samples`` a time occurs twice at each jump, with both states; ``arc.jumps.to_xarray()``
-        has the jumps. ``.to_netcdf(path)`` or ``.to_zarr(path)`` saves the dataset, and `open_store` reads
-        it.
+        If the system has outputs they are in ``outputs`` (axes ``t`` and ``output``). Without ``samples`` a
+        time occurs twice at each jump, with both states; ``arc.jumps.to_xarray()`` has the jumps.
+        ``.to_netcdf(path)`` or ``.to_zarr(path)`` saves the dataset, and `open_store` reads it.
         """
         import xarray
 
@@ -204,7 +256,8 @@ class HybridArc:
             variables["fundamental"] = (("state", "tangent"), rows)
         coords = {"t": ("t", self.t, names.of("t")), **names.coords()}
         made_by = attributes("arc", self.status, self.system, self.parameters)
-        return xarray.Dataset(variables, coords, made_by)
+        found = xarray.Dataset(variables, coords, made_by)
+        return with_outputs(found, self.system, {"outputs": ("t", self._table(self.system.outputs))})
 
     def __repr__(self) -> str:
         span = f"t = {self.t[0]:.6g} to {self.t[-1]:.6g}" if len(self.t) else "no points"
@@ -214,36 +267,50 @@ class HybridArc:
         """The arc for a notebook: how it ended, and its end by name."""
         if not len(self.t):
             return f"<p>{escape(repr(self))}</p>"
-        names = ("t", "mode", *self.system.state_names)
+        names = self.system.quantity_names
+        table = self._table(names, np.array([0, -1]))
         ends = [
-            [f"{self.t[i]:.6g}", str(self.mode[i]), *(f"{value:.6g}" for value in self.x[i])] for i in (0, -1)
+            [f"{self.t[i]:.6g}", str(self.mode[i]), *(f"{value:.6g}" for value in table[i])] for i in (0, -1)
         ]
+        names = ("t", "mode", *names)
         return f"<p>{escape(repr(self))}</p>\n<p>{escape(str(self.status))}</p>\n{html_table(names, ends)}"
 
-    def __getitem__(self, component: str) -> np.ndarray:
-        """A component of the state at the points of the arc, ``(N,)``.
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A component of the state or an output at the points of the arc, ``(N,)``.
+
+        An output is nan in modes in which it has no value.
 
         Raises
         ------
         ArgumentError
-            If the state has no component of that name.
+            If there is no component and no output of that name.
         """
-        names = self.system.state_names
-        return self.x[
-            :, names.index(arguments.known("State component", component, names, "State components"))
-        ]
+        return self._table([quantity("", name, self.system)])[:, 0]
 
-    def __call__(self, t: ArrayLike) -> np.ndarray:
+    def _table(self, names: Iterable[str], points: Any = slice(None)) -> np.ndarray:
+        """Components and outputs at points of the arc, ``(N, len(names))``."""
+        places = self.t[points], self.x[points], self._mode_index[points]
+        return table_of(self.system, [*names], *places, self._values)
+
+    @property
+    def _values(self) -> np.ndarray:
+        """The parameter vector ``(m,)``."""
+        return self.system.parameter_values(self.parameters)
+
+    def __call__(self, t: ArrayLike, name: str | None = None) -> np.ndarray:
         """State at time ``t``, a scalar or an array, from the dense output: ``t.shape + (n,)``.
 
-        At the time of a jump this is the state after it.
+        At the time of a jump this is the state after it. With the ``name`` of a component or of an output it
+        is that one alone, ``t.shape``.
 
         Raises
         ------
         ArgumentError
-            If a time lies outside the run, or the run kept samples only.
+            If a time lies outside the run, the run kept samples only, or there is no such name.
         """
         times = arguments.numbers("t", t, "be a time or an array of times")
+        if name is not None:
+            quantity("name: ", name, self.system)
         if self._pieces is None:
             raise ArgumentError(
                 "This arc keeps samples only. Run simulate without samples= for dense output."
@@ -253,13 +320,23 @@ class HybridArc:
             raise ArgumentError(
                 f"t must lie in the run, [{self.t[0]}, {self.t[-1]}]; got {times.min()} to {times.max()}."
             )
-        flat = inside.ravel()
+        states, modes = self._dense(inside.ravel())
+        if name is None:
+            return states.reshape(*times.shape, self.system.dimension)
+        found = values_of(self.system, name, inside.ravel(), states, modes, self._values)
+        return found.reshape(times.shape)
+
+    def _dense(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """States ``(N, n)`` and indices of the modes ``(N,)`` at times in the run."""
+        assert self._pieces is not None
         if len(self._pieces.t) == 0:
-            return np.broadcast_to(self.x[-1], (*times.shape, self.system.dimension)).copy()
-        states, _ = self._pieces.at(flat)
+            ends = np.full(len(times), -1)
+            return self.x[ends], self._mode_index[ends]
+        states, steps = self._pieces.at(times)
+        modes = self._pieces.mode[steps]
         # A step ends at its jump, but the end of the run may be after it.
-        states[flat >= self.t[-1]] = self.x[-1]
-        return states.reshape(*times.shape, self.system.dimension)
+        states[times >= self.t[-1]], modes[times >= self.t[-1]] = self.x[-1], self._mode_index[-1]
+        return states, modes
 
 
 def without_component(arc: HybridArc, i: int, system: HybridSystem) -> HybridArc:

@@ -14,7 +14,8 @@ from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
 from hybrid.display.tables import counted, html_table
 from hybrid.errors import ArgumentError
-from hybrid.simulation.labelled import Names, attributes
+from hybrid.simulation.labelled import Names, attributes, with_outputs
+from hybrid.simulation.quantities import quantity, values_of
 from hybrid.simulation.saltation import matrices_at
 from hybrid.system.elements import END
 from hybrid.system.graph import HybridSystem
@@ -125,6 +126,11 @@ class Sensitivities(Protocol):
     """What knows the derivatives of a run: `hybrid.simulation.sensitivity`."""
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        ...
+
+    @property
     def samples(self) -> np.ndarray | None:
         """Times of the samples, if there are any."""
         ...
@@ -222,6 +228,34 @@ class Jumps(Sequence[Jump]):
         """States after the jumps, ``(jumps, n)``."""
         return self._states[:, 1]
 
+    def before(self, name: str) -> np.ndarray:
+        """A component or an output before the jumps, in the modes that they leave, ``(jumps,)``.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no such name.
+        """
+        sources = [self.system.mode_index(each.source) for each in self.system.transitions]
+        return self._quantity(name, self.x_minus, np.array(sources, dtype=np.int64)[self._transition])
+
+    def after(self, name: str) -> np.ndarray:
+        """A component or an output after the jumps, in the modes that they lead to, ``(jumps,)``.
+
+        After a jump that ends the run, this is the mode before it.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no such name.
+        """
+        targets = [self.system.mode_index(each.target or each.source) for each in self]
+        return self._quantity(name, self.x_plus, np.array(targets, dtype=np.int64))
+
+    def _quantity(self, name: str, x: np.ndarray, mode: np.ndarray) -> np.ndarray:
+        quantity("name: ", name, self.system)
+        return values_of(self.system, name, self.t, x, mode, self._parameters)
+
     @cached_property
     def saltation(self) -> np.ndarray:
         """As in :class:`Jump`, ``(jumps, n, n)``; those that the run did not need are made when looked at."""
@@ -257,7 +291,13 @@ class Jumps(Sequence[Jump]):
             "x_plus": (("jump", "state"), self.x_plus, names.states),
             "transversality": ("jump", self.transversality),
         }
-        return xarray.Dataset(variables, names.coords(), attributes("jumps", system=self.system))
+        found = xarray.Dataset(variables, names.coords(), attributes("jumps", system=self.system))
+        sides = {"outputs_minus": self.before, "outputs_plus": self.after}
+        tables = {
+            variable: ("jump", np.array([side(name) for name in self.system.outputs]).T)
+            for variable, side in sides.items()
+        }
+        return with_outputs(found, self.system, tables)
 
     def __len__(self) -> int:
         return len(self._phase)

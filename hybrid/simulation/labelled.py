@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -12,6 +12,9 @@ import numpy as np
 from hybrid.display.tables import with_unit
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
+
+if TYPE_CHECKING:
+    import xarray
 
 
 @attrs.frozen
@@ -48,6 +51,32 @@ class Names:
     def rate(self) -> dict[str, str]:
         """Attributes of a value per unit of time, such as an exponent."""
         return {"units": f"1/{self.units['t']}"} if "t" in self.units else {}
+
+
+def with_outputs(
+    dataset: xarray.Dataset,
+    system: HybridSystem,
+    tables: Mapping[str, tuple[Any, np.ndarray]],
+    names: Iterable[str] | None = None,
+) -> xarray.Dataset:
+    """The dataset with outputs of a system along the axis ``output``, if there are any: by default all.
+
+    Each table has the name of its variable, its axis besides, and values ``(N, outputs)``; without such an
+    axis, ``()``, they are ``(outputs,)``.
+    """
+    listed = [*(system.outputs if names is None else names)]
+    if not listed:
+        return dataset
+    named = {name: ((*([dim] if dim else []), "output"), values) for name, (dim, values) in tables.items()}
+    return dataset.assign(named).assign_coords(output_coords(listed, system.units))
+
+
+def output_coords(names: list[str], units: Mapping[str, str]) -> dict[str, Any]:
+    """The coordinates of the axis ``output``: names, and units if any is known."""
+    coords: dict[str, Any] = {"output": ("output", names)}
+    if any(name in units for name in names):
+        coords["output_unit"] = ("output", [units.get(name, "") for name in names])
+    return coords
 
 
 def with_counters(rows: np.ndarray, n: int) -> np.ndarray:

@@ -156,6 +156,11 @@ class Trajectory:
         return values
 
     @property
+    def named_parameters(self) -> dict[str, float]:
+        """The values of the parameters, by name."""
+        return dict(zip(self.system.variables.parameter_names, self.parameters.tolist(), strict=True))
+
+    @property
     def run(self) -> Any:
         """The state of the run."""
         return self.memory.run

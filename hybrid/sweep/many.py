@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -19,10 +19,11 @@ from hybrid.kernels.types import codes
 from hybrid.kernels.types.starts import Sampled
 from hybrid.simulation.crew import TOGETHER, Crew, berths, together
 from hybrid.simulation.ending import status_of
-from hybrid.simulation.labelled import Names, attributes
+from hybrid.simulation.labelled import Names, attributes, with_outputs
 from hybrid.simulation.memory import starts_of
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import check_solver, plan_of
+from hybrid.simulation.quantities import mode_indices, output_names, table_of
 from hybrid.simulation.simulate import simulate
 from hybrid.simulation.trajectory import Trajectory
 from hybrid.solvers import Solver
@@ -51,6 +52,7 @@ def simulate_many(
     parameters: Mapping[str, float] | None = None,
     solver: Solver | None = None,
     samples: ArrayLike | None = None,
+    outputs: Iterable[str] = (),
     max_jumps: int = 100_000,
     executor: int | None = None,
     progress: bool | None = None,
@@ -71,6 +73,8 @@ def simulate_many(
         components and counters come last and may be left out: they are 0 then.
     samples
         Increasing times at which to store the state. A step ends at each of them.
+    outputs
+        Names of outputs to compute at the ends.
     executor
         Number of threads; by default all cores.
     progress
@@ -82,7 +86,8 @@ def simulate_many(
     xarray.Dataset
         Over the axis ``start``: ``x0`` and ``x_end`` (axis ``state``), ``t_end``, ``mode_end``, ``jumps``,
         ``status`` and ``message``; with samples also ``x`` (axes ``start``, ``t``, ``state``), nan after the
-        end of a run. The attributes tell how many ``steps_together`` and ``steps_alone`` the runs took.
+        end of a run; with outputs also ``outputs_end`` (axis ``output``). The attributes tell how many
+        ``steps_together`` and ``steps_alone`` the runs took.
 
     Raises
     ------
@@ -103,6 +108,7 @@ def simulate_many(
     t0, t1 = arguments.time_span("t_span", t_span)
     times = np.empty(0) if samples is None else arguments.increasing_times("samples", samples, t0, t1)
     origins = _origins(system, x0)
+    asked = output_names("outputs", outputs, system)
     progress = None if progress is None else arguments.flag("progress", progress)
     most = arguments.count("max_jumps", max_jumps, 0)
     threads = cores() if executor is None else arguments.count("executor", executor, 1)
@@ -119,7 +125,10 @@ def simulate_many(
         run_in_blocks(work.run, len(origins), threads, bar)
         # An interrupt that came too late to stop anything is not raised either.
         CTRL_C.is_set()
-    return found.dataset(system, overrides)
+    made = found.dataset(system, overrides)
+    return with_outputs(
+        made, system, {"outputs_end": ("start", found.outputs(system, asked, overrides))}, asked
+    )
 
 
 def _origins(system: HybridSystem, x0: Any) -> np.ndarray:
@@ -161,6 +170,17 @@ class _Found:
     def tell(self, i: int, status: Status) -> None:
         """Keep how a run ended."""
         self.codes[i], self.messages[i] = status.code, text_of(status)
+
+    def outputs(
+        self, system: HybridSystem, names: tuple[str, ...], parameters: Mapping[str, float]
+    ) -> np.ndarray:
+        """Outputs at the ends ``(N, len(names))``; nan where a run has none."""
+        if system.growth is not None:
+            system = system.growth.current
+        table, ended = np.full((len(self.mode), len(names)), np.nan), np.flatnonzero(self.mode != "")
+        modes, values = mode_indices(system, self.mode[ended]), system.parameter_values(parameters)
+        table[ended] = table_of(system, names, self.t_end[ended], self.states[ended, -1], modes, values)
+        return table
 
     def dataset(self, system: HybridSystem, parameters: Mapping[str, float]) -> xarray.Dataset:
         """The results with their names."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from functools import cached_property
 from typing import Any, Literal, TypeVar
@@ -17,8 +17,9 @@ from hybrid.errors import ArgumentError, HybridError
 from hybrid.kernels.types import codes
 from hybrid.orbits.sections import crossings, strobe
 from hybrid.simulation.ending import status_of
-from hybrid.simulation.labelled import Names
+from hybrid.simulation.labelled import Names, output_coords
 from hybrid.simulation.plan import check_solver, plan_of
+from hybrid.simulation.quantities import output_names, table_of
 from hybrid.simulation.trajectory import Common, Trajectory, directed, explore
 from hybrid.solvers import Solver
 from hybrid.sweep.points import as_points
@@ -51,6 +52,8 @@ class Rows:
         Where the section is taken, and the system with the markers of a surface.
     along
         The axis along which the attractor is followed, or None.
+    outputs
+        Names of the outputs that are computed at the points of the section.
     """
 
     system: HybridSystem
@@ -63,6 +66,7 @@ class Rows:
     at: At
     marked: HybridSystem
     along: str | None
+    outputs: tuple[str, ...]
     # The rows on each stage of a growing system.
     _stages: dict[int, Rows] = attrs.field(factory=dict, init=False, repr=False)
 
@@ -147,22 +151,33 @@ class Rows:
             return None
         return without_age(self.system, trajectory.x), trajectory.mode
 
-    def section(self, trajectory: Trajectory, points: int) -> tuple[np.ndarray, int]:
-        """The next points of the section ``(points, n)``, filled up with nan, and the code of the run."""
-        states = np.full((points, self.system.dimension), np.nan)
+    def section(self, trajectory: Trajectory, points: int) -> tuple[np.ndarray, np.ndarray]:
+        """The next points of the section ``(points, n)``, and outputs at them, filled up with nan."""
+        states, outputs = self.no_section(points)
         if not points:
-            return states, codes.DONE
+            return states, outputs
         if self.at is None:
-            found, _, code = strobe(trajectory, points)
+            found, places, code = strobe(trajectory, points)
+            t, modes = places[:, 0] * trajectory.model.period + trajectory.phase0, places[:, 1]
         else:
             counted = np.ones(len(trajectory.system.transitions), dtype=bool)
             if self.at != "jumps":
                 counted = np.arange(len(counted)) < len(self.system.modes)
             plain = attrs.evolve(trajectory, tangents=0)
-            _, found, _, _, code = crossings(plain, counted, points)
+            t, found, fired, _, code = crossings(plain, counted, points)
+            sources = [self.system.mode_index(each.source) for each in trajectory.system.transitions]
+            modes = np.array(sources, dtype=np.int64)[fired]
         status_of(trajectory, code)
-        states[: len(found)] = without_age(self.system, found[:points])
-        return states, code
+        found = without_age(self.system, found[:points])
+        states[: len(found)] = found
+        table = table_of(self.system, self.outputs, t[:points], found, modes[:points], trajectory.parameters)
+        outputs[: len(found)] = table
+        return states, outputs
+
+    def no_section(self, points: int) -> tuple[np.ndarray, np.ndarray]:
+        """What stands for the points of a section that are not known, and for the outputs at them."""
+        shapes = (points, self.system.dimension), (points, len(self.outputs))
+        return np.full(shapes[0], np.nan), np.full(shapes[1], np.nan)
 
     def facts(self) -> dict[str, Any]:
         """What decides the rows, by name."""
@@ -180,12 +195,14 @@ class Rows:
             "solver": self.solver,
             "at": self.at,
             "continue_from": self.along,
+            **{f"output_{name}": self.system.outputs[name] for name in self.outputs},
         }
 
     def labels(self, dims: Mapping[str, tuple[str, ...]]) -> Labels:
         """Names of the inner axes of results, and units."""
         names = Names(self.system.state_names, self.system.units)
-        coords = {name: ((dim,), values) for name, (dim, values) in names.coords().items()}
+        both = names.coords() | (output_coords([*self.outputs], names.units) if self.outputs else {})
+        coords = {name: ((dim,), values) for name, (dim, values) in both.items()}
         rates = dict.fromkeys(("exponents", "standard_error", "sum_rule"), names.rate)
         states = dict.fromkeys(("x_end", "section"), names.states)
         own = {name: names.of(name) for name in self.system.units}
@@ -205,6 +222,7 @@ def rows_of(
     at: At,
     continue_from: str | None,
     results: tuple[str, ...],
+    outputs: Iterable[str] = (),
 ) -> Rows:
     """The rows of a sweep over parameters and components of the start, with every argument checked."""
     as_system("system", system)
@@ -245,6 +263,7 @@ def rows_of(
         at=_place_of_section(system, at, points),
         marked=with_section(system, at) if isinstance(at, Guard) else system,
         along=along,
+        outputs=output_names("outputs", outputs, system),
     )
 
 

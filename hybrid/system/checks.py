@@ -87,6 +87,25 @@ def trial(variables: Variables, title: str, function: Callable[..., Any], *, of_
     return None if value is None else value[0]
 
 
+def check_number(variables: Variables, owner: str, function: Callable[..., Any]) -> None:
+    """Call a function of ``(t, x, p)`` that gives one number, at the generic points of model functions.
+
+    Raises
+    ------
+    ModelError
+        If the function has the wrong arity, asks for a name that does not exist, fails, is not pure, or does
+        not return one number.
+    """
+    called = ModelFunction(owner, "function", function, "", None, None)
+    value = _call(called.title, function, _arguments(variables))
+    if value is None:
+        _check_division(variables, called)
+        return
+    if not _is_number(value[0]):
+        raise ModelError(f"{called.title} must return one number; got {arguments.shown(value[0])}.")
+    _check_pure(variables, called)
+
+
 def derivative_has_time_column(variables: Variables, function: ModelFunction) -> bool:
     """Whether a given derivative returns ``n + 1`` columns; False if it fails at the sample point."""
     assert function.derivative is not None

@@ -51,6 +51,8 @@ def _heading(system: Any) -> list[str]:
         lines.insert(2, f"held: {', '.join(told[moving:tangent])}")
     if "t" in units:
         lines.insert(2, f"time: {with_unit('t', units['t'])}")
+    if system.outputs:
+        lines.append(f"outputs: {', '.join(with_unit(name, units.get(name)) for name in system.outputs)}")
     if system.start is not None:
         lines.append(f"start: {system.start!r}")
     if system.listed_order:

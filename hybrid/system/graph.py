@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
@@ -17,8 +17,20 @@ from hybrid.system.clocks import fault_of, numbers_of
 from hybrid.system.described import described, described_in_html
 from hybrid.system.elements import END, Mode, Transition
 from hybrid.system.functions import ModelFunction, functions_in
-from hybrid.system.growth import Growth, grows
+from hybrid.system.given import (
+    as_listed_order,
+    as_modes,
+    as_notes,
+    as_period,
+    as_transitions,
+    check_derived_from,
+    check_growth,
+    check_laws,
+    check_name,
+)
+from hybrid.system.growth import Growth
 from hybrid.system.laws import Laws, placed
+from hybrid.system.outputs import Output, as_outputs, check_outputs
 from hybrid.system.periodicity import Period, period_at
 from hybrid.system.portable import Portable
 from hybrid.system.switching import switching_inside
@@ -27,51 +39,6 @@ from hybrid.system.watched import Watched
 
 if TYPE_CHECKING:
     import networkx as nx
-
-
-def _as_modes(value: Iterable[Mode]) -> tuple[Mode, ...]:
-    return tuple(arguments.items("HybridSystem: modes", value, "be a list of Mode objects"))
-
-
-def _as_transitions(value: Iterable[Transition]) -> tuple[Transition, ...]:
-    return tuple(arguments.items("HybridSystem: transitions", value, "be a list of Transition objects"))
-
-
-def _as_listed_order(value: object) -> bool:
-    return arguments.flag("HybridSystem: listed_order", value)
-
-
-def _as_period(value: Any) -> Any:
-    if value is None or callable(value):
-        return value
-    return arguments.positive("HybridSystem: period", value, "be a positive time or a function of p")
-
-
-def _as_notes(value: Iterable[str]) -> tuple[str, ...]:
-    lines = arguments.items("HybridSystem: notes", value, "be a list of lines of text")
-    return tuple(arguments.instance(f"HybridSystem: notes[{i}]", line, str) for i, line in enumerate(lines))
-
-
-def _growth(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
-    if value is not None and not grows(value):
-        raise arguments.refusal(
-            "HybridSystem: growth", "be left out: split and from_equations give it", value
-        )
-
-
-def _derived_from(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
-    if not isinstance(value, Watched):
-        raise arguments.refusal(
-            "HybridSystem: derived_from", "be left out: split and filippov give it", value
-        )
-
-
-def _laws(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
-    arguments.instance("HybridSystem: laws", value, Laws, "Write Laws(invariant={...}).")
-
-
-def _name(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
-    arguments.instance(f"{type(instance).__name__}: {attribute.name}", value, str)
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -110,13 +77,19 @@ class HybridSystem(Portable):
     name
         For reports and figures.
     units
-        Units by name, of components of the state, of parameters, and of time under the name ``"t"``; any may
-        be left out. Results as datasets and pictures show them, and `hybrid.testing` checks that functions
-        fit them; no run uses them.
+        Units by name, of components of the state, of parameters, of outputs, and of time under the name
+        ``"t"``; any may be left out. Results as datasets and pictures show them, and `hybrid.testing` checks
+        that functions fit them; no run uses them.
     angles
         Components that are angles, with the length of a turn: ``{"phi": 2 * np.pi}``. A turn further the
         functions must be the same, which is checked; a reset may add whole turns. Orbits close, and
         attractors are near, up to whole turns. The state itself is never wrapped.
+    outputs
+        Quantities that follow from time, state and parameters, such as a contact force, by name:
+        ``{"energy": lambda t, x, p: ...}``, or with a function for some of the modes,
+        ``{"force": {"contact": lambda t, x, p: ...}}``; in a mode without one the output is nan. Their names
+        work where the names of components do: ``arc["force"]``, pictures, datasets, `Laws`, ``units``. They
+        are computed from results when asked for; a run never evaluates them.
     laws
         What the author knows of the runs, such as a conserved energy: `Laws`. The checks of
         `hybrid.testing` use them, and say so if one does not fit the system. `periodic_orbit` holds what is
@@ -174,25 +147,28 @@ class HybridSystem(Portable):
     held: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=as_held)
     counters: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=as_counters)
     parameters: Mapping[str, float] = attrs.field(factory=dict, kw_only=True, converter=as_parameters)
-    modes: tuple[Mode, ...] = attrs.field(kw_only=True, converter=_as_modes)
-    transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=_as_transitions)
+    modes: tuple[Mode, ...] = attrs.field(kw_only=True, converter=as_modes)
+    transitions: tuple[Transition, ...] = attrs.field(default=(), kw_only=True, converter=as_transitions)
     # It decides no result, but what the status says of one.
-    listed_order: bool = attrs.field(default=False, kw_only=True, converter=_as_listed_order, repr=False)
-    period: Period = attrs.field(default=None, kw_only=True, converter=_as_period)
+    listed_order: bool = attrs.field(default=False, kw_only=True, converter=as_listed_order, repr=False)
+    period: Period = attrs.field(default=None, kw_only=True, converter=as_period)
     start: str | None = attrs.field(default=None, kw_only=True)
-    name: str = attrs.field(default="", kw_only=True, validator=_name)
+    name: str = attrs.field(default="", kw_only=True, validator=check_name)
     angles: Mapping[str, float] = attrs.field(factory=dict, kw_only=True, repr=False)
     # Units decide no result, so systems that differ in them are the same model.
     units: Mapping[str, str] = attrs.field(factory=dict, kw_only=True, eq=False, repr=False)
-    # Nor do laws.
-    laws: Laws = attrs.field(factory=Laws, kw_only=True, eq=False, repr=False, validator=_laws)
+    # Nor do outputs and laws.
+    outputs: Mapping[str, Output] = attrs.field(
+        factory=dict, kw_only=True, converter=as_outputs, eq=False, repr=False
+    )
+    laws: Laws = attrs.field(factory=Laws, kw_only=True, eq=False, repr=False, validator=check_laws)
     # Lines for `repr`: what short names in a derived system stand for.
-    notes: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=_as_notes, repr=False)
+    notes: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=as_notes, repr=False)
     # What makes further modes, for a system that is made in stages.
-    growth: Growth | None = attrs.field(default=None, kw_only=True, validator=_growth, repr=False)
+    growth: Growth | None = attrs.field(default=None, kw_only=True, validator=check_growth, repr=False)
     # What the functions read that this system was derived from.
     derived_from: Watched = attrs.field(
-        factory=Watched, kw_only=True, validator=_derived_from, eq=False, repr=False
+        factory=Watched, kw_only=True, validator=check_derived_from, eq=False, repr=False
     )
     # Cache of compile_system, with the lifetime of the system.
     _compiled: Any = attrs.field(default=None, init=False, repr=False)
@@ -202,8 +178,11 @@ class HybridSystem(Portable):
     _made_by: Any = attrs.field(default=None, init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
-        object.__setattr__(self, "units", self.variables.as_units(self.units))
+        check_outputs(self.outputs, self.variables)
+        object.__setattr__(self, "units", self.variables.as_units(self.units, self.outputs))
         self._check_graph()
+        for output in self.outputs.values():
+            output.check_modes(_written(self, "modes"))
         object.__setattr__(self, "angles", self.variables.as_angles(self.angles))
         unchecked = self._unchecked()
         check_functions(self.variables, unchecked, self.period)
@@ -275,6 +254,11 @@ class HybridSystem(Portable):
     def state_names(self) -> tuple[str, ...]:
         """Names of all components of ``x``; ``x0, x1, ...`` if only their number was given."""
         return self.variables.state_names
+
+    @property
+    def quantity_names(self) -> tuple[str, ...]:
+        """Names of all components of ``x`` and of the outputs: what results may be asked for."""
+        return (*self.state_names, *self.outputs)
 
     @cached_property
     def mode_names(self) -> tuple[str, ...]:
@@ -451,10 +435,11 @@ def laws_of(system: HybridSystem, given: Laws | None = None) -> Laws:
     Raises
     ------
     ArgumentError, ModelError
-        If a law does not fit the system.
+        If a law does not fit the system, or names an output that the system does not have.
     """
     laws = system.laws if given is None else system.laws.joined(given)
-    return placed(laws, system.variables, _written(system, "modes"), _written(system, "transitions"))
+    names = _written(system, "modes"), _written(system, "transitions")
+    return placed(laws, system.variables, system.outputs, *names)
 
 
 def _written(system: HybridSystem, what: str) -> dict[str, None]:

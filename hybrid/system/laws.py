@@ -13,17 +13,19 @@ from hybrid.errors import ModelError
 from hybrid.system.checks import trial
 from hybrid.system.elements import Function
 from hybrid.system.labels import named
+from hybrid.system.outputs import Component, Output, function_in
 from hybrid.system.portable import Portable
 from hybrid.system.variables import Variables
 
+NOT_NAMED = "be a function of (t, minus, plus, p)"
 # Names of components that change sign when time is reversed, or the involution of the state.
 Elastic = Iterable[str] | Callable[[Any], Any]
-BY_NAME = "map names to functions of (t, x, p)"
+BY_NAME = "map names to functions of (t, x, p) or to names of outputs"
 
 
 @attrs.frozen
 class Law(Portable):
-    """A function with a name, which says something in one mode, at one transition, or everywhere.
+    """A quantity with a name, which says something in one mode, at one transition, or everywhere.
 
     Attributes
     ----------
@@ -31,26 +33,39 @@ class Law(Portable):
         The law in the author's words.
     of
         Name of a mode or of a transition; None for everywhere.
-    function
-        ``(t, x, p)``, or ``(t, minus, plus, p)`` at a transition.
+    quantity
+        A function of ``(t, x, p)``, or ``(t, minus, plus, p)`` at a transition; or the name of a component or
+        of an output, in place of which `placed` puts the component or the output itself.
     flow
-        Another function ``(t, x, p)``, that which its rate is compared with.
+        Another quantity, that which its rate is compared with.
     """
 
     name: str
     of: str | None
-    function: Function
-    flow: Function | None = None
+    quantity: Any
+    flow: Any = None
 
-    def holds_in(self, *names: str | None) -> bool:
-        """Whether it says something of a mode, or of a transition, with one of these names."""
-        return self.of is None or self.of in names
+    def in_mode(self, *names: str | None) -> Function | None:
+        """The function of a mode with one of these names; None if the law says nothing there."""
+        return function_in(self.quantity, *names) if self.of is None or self.of in names else None
+
+    def flow_in(self, *names: str | None) -> Function | None:
+        """The function that the rate is compared with in a mode with one of these names, or None."""
+        return None if self.flow is None else function_in(self.flow, *names)
+
+    @property
+    def formulas(self) -> list[Function]:
+        """Every function of the law."""
+        whole = [each for each in (self.quantity, self.flow) if each is not None]
+        return [f for each in whole for f in (each.functions if isinstance(each, Output) else [each])]
 
 
 def _by_name(argument: str, given: Any, *, pairs: bool = False, at: str = "mode") -> tuple[Law, ...]:
     """The laws of an argument; with ``pairs`` a value may be a function and its flow."""
     if isinstance(given, tuple) and all(isinstance(each, Law) for each in given):
         return given
+    if isinstance(given, list | tuple) and at == "mode":
+        given = {arguments.instance(f"{argument}: a name", name, str): name for name in given}
     found = []
     for name, value in named(argument, given, BY_NAME).items():
         arguments.instance(f"{argument}: a name", name, str)
@@ -63,13 +78,21 @@ def _by_name(argument: str, given: Any, *, pairs: bool = False, at: str = "mode"
     return tuple(found)
 
 
-def _functions(title: str, value: Any, pairs: bool, at: str) -> tuple[Function, Function | None]:
+def _functions(title: str, value: Any, pairs: bool, at: str) -> tuple[Any, Any]:
     both = value if isinstance(value, tuple | list) and pairs else (value, None)
-    if len(both) == 2 and callable(both[0]) and (both[1] is None or callable(both[1])):
+    named_too = at == "mode"
+    if (
+        len(both) == 2
+        and _is_quantity(both[0], named_too)
+        and (both[1] is None or _is_quantity(both[1], True))
+    ):
         return both[0], both[1]
-    signature = "(t, x, p)" if at == "mode" else "(t, minus, plus, p)"
-    wanted = f"be a function of {signature}" + (", or a pair of them" if pairs else "")
-    raise arguments.refusal(title, wanted, value)
+    wanted = "be a function of (t, x, p) or the name of an output" if named_too else NOT_NAMED
+    raise arguments.refusal(title, wanted + (", or a pair of them" if pairs else ""), value)
+
+
+def _is_quantity(value: Any, named_too: bool) -> bool:
+    return callable(value) or (named_too and isinstance(value, str))
 
 
 def _invariant(given: Any) -> tuple[Law, ...]:
@@ -98,8 +121,8 @@ def _balance(given: Any) -> tuple[Law, ...]:
         if law.flow is None:
             raise arguments.refusal(
                 f"balance: {law.name!r}",
-                "be a pair of functions of (t, x, p), a quantity and its rate",
-                law.function,
+                "be a pair of functions of (t, x, p), or of names of outputs: a quantity and its rate",
+                law.quantity,
             )
     return laws
 
@@ -122,8 +145,10 @@ class Laws(Portable):
     """What the author of a model knows: each law is one line, and finds the mistakes that break it.
 
     A law is a function of ``(t, x, p)`` under a name, which holds in every mode, or in one mode:
-    ``{"energy": f}`` or ``{"flight": {"energy": f}}``. In a system that has been split, the names of modes
-    and transitions are those from before.
+    ``{"energy": f}`` or ``{"flight": {"energy": f}}``. In place of a function it takes the name of an output
+    of the system, or of a component; it then holds in the modes in which the output has a value. A list of
+    names, ``["force"]``, is short for laws of the same names. In a system that has been split, the names of
+    modes and transitions are those from before.
 
     Parameters
     ----------
@@ -159,7 +184,7 @@ class Laws(Portable):
     Raises
     ------
     ArgumentError
-        If a law is not a function, or no pair of them where a pair is needed.
+        If a law is neither a function nor a name, or no pair of them where a pair is needed.
 
     Examples
     --------
@@ -199,13 +224,21 @@ class Laws(Portable):
         )
 
 
-def placed(laws: Laws, variables: Variables, modes: Iterable[str], transitions: Iterable[str]) -> Laws:
+def placed(
+    laws: Laws,
+    variables: Variables,
+    outputs: Mapping[str, Output],
+    modes: Iterable[str],
+    transitions: Iterable[str],
+) -> Laws:
     """The laws of a model with these names; a law under the name of a mode holds in that mode.
+
+    Names of outputs and components become these themselves.
 
     Raises
     ------
     ArgumentError
-        If a mode or a transition does not exist.
+        If a mode, a transition or an output does not exist.
     ModelError
         If a function asks for a name that does not exist, or does not return a number.
     """
@@ -218,10 +251,7 @@ def placed(laws: Laws, variables: Variables, modes: Iterable[str], transitions: 
         for law in in_modes:
             if law.of is not None:
                 arguments.known(f"{kind}: Mode", law.of, modes, "Modes")
-            _try(variables, f"{kind}: {law.name!r}", law.function)
-            if law.flow is not None:
-                _try(variables, f"{kind}: {law.name!r}, its rate", law.flow)
-        found[kind] = tuple(in_modes)
+        found[kind] = tuple(_with_quantities(law, kind, variables, outputs) for law in in_modes)
     if isinstance(laws.elastic, tuple):
         for name in laws.elastic:
             arguments.known("elastic: State component", name, variables.state_names, "State components")
@@ -229,8 +259,27 @@ def placed(laws: Laws, variables: Variables, modes: Iterable[str], transitions: 
         arguments.known("continuous: Transition", name, transitions, "Transitions")
     for law in laws.across:
         arguments.known("across: Transition", law.of, transitions, "Transitions")
-        trial(variables, f"across: {law.name!r}", law.function, of_jump=True)
+        trial(variables, f"across: {law.name!r}", law.quantity, of_jump=True)
     return attrs.evolve(laws, **found)
+
+
+def _with_quantities(law: Law, kind: str, variables: Variables, outputs: Mapping[str, Output]) -> Law:
+    """The law with a component or an output in place of its name; functions are called once."""
+
+    def meant(what: Any, title: str) -> Any:
+        if isinstance(what, str):
+            names = variables.state_names
+            known = (*outputs, *names)
+            arguments.known(
+                f"{title}: Output or state component", what, known, "Outputs and state components"
+            )
+            return outputs[what] if what in outputs else Component(names.index(what))
+        if what is not None and not isinstance(what, Output | Component):
+            _try(variables, title, what)
+        return what
+
+    title = f"{kind}: {law.name!r}"
+    return attrs.evolve(law, quantity=meant(law.quantity, title), flow=meant(law.flow, f"{title}, its rate"))
 
 
 def _try(variables: Variables, title: str, function: Function) -> None:

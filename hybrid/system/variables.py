@@ -164,11 +164,11 @@ class Variables:
             values[names.index(name)] = arguments.number(f"parameters: Parameter {name!r}", number)
         return values
 
-    def as_units(self, value: object) -> Mapping[str, str]:
-        """Units by name of a component, of a parameter or of the time ``t``, read-only."""
+    def as_units(self, value: object, outputs: Iterable[str] = ()) -> Mapping[str, str]:
+        """Units by name of a component, of a parameter, of an output or of the time ``t``, read-only."""
         given = named("HybridSystem: units", value, "map names to texts")
         for name, unit in given.items():
-            names = [*self.state_names, *self.parameter_names, "t"]
+            names = [*self.state_names, *self.parameter_names, *outputs, "t"]
             arguments.known("HybridSystem: units: Name", name, names, "Names")
             arguments.instance(f"HybridSystem: units[{name!r}]", unit, str)
         return FrozenMapping(given)

@@ -26,6 +26,7 @@ from hybrid.testing.invariance import (
 )
 from hybrid.testing.landing import check_landings, check_limits
 from hybrid.testing.laws import check_laws
+from hybrid.testing.outputs import check_outputs
 from hybrid.testing.reads import check_reads
 from hybrid.testing.report import PropertyReport, SystemReport
 from hybrid.testing.saltation import (
@@ -65,6 +66,7 @@ __all__ = [
     "check_limits",
     "check_names",
     "check_order",
+    "check_outputs",
     "check_period",
     "check_reads",
     "check_saltation",

@@ -175,16 +175,24 @@ class Case:
         """The vector field ``(n,)`` of a mode at ``(t, x)``, with the parameters of this case."""
         return self.evaluate(self.rates_of(mode), t, x)
 
-    def law(self, name: str, t: float, x: Any) -> float:
-        """The quantity of a law of states, such as an energy, at ``(t, x)``.
+    def law(self, name: str, t: float, x: Any, mode: str | None = None) -> float:
+        """The quantity of a law of states, such as an energy, at ``(t, x)`` in a mode.
+
+        Without ``mode`` this is the mode that the case starts in. The quantity is nan where the law says
+        nothing of the mode.
 
         Raises
         ------
         ArgumentError
             If the case has no law of that name.
         """
-        laws = {law.name: law for some in self.laws.in_modes.values() for law in some}
-        return float(self.evaluate(laws[arguments.known("Law", name, laws, "Laws")].function, t, x)[0])
+        laws = [law for some in self.laws.in_modes.values() for law in some]
+        arguments.known("Law", name, [law.name for law in laws], "Laws")
+        mode = mode or self.mode
+        names = () if mode is None else self.names_of_mode(mode)
+        found = [law.in_mode(*names) for law in laws if law.name == name]
+        function = next((each for each in found if each is not None), None)
+        return np.nan if function is None else float(self.evaluate(function, t, x)[0])
 
     def mode_of(self, name: str) -> Mode:
         """The mode of that name."""
@@ -421,7 +429,8 @@ def lies_beyond(case: Case) -> str:
         if not value < 0.0:
             told.append(f"guard {transition.name!r} of mode {transition.source!r}")
     for law in case.laws.invariant:
-        if not float(case.evaluate(law.function, case.t0, case.x0)[0]) >= 0.0:
+        values = [float(case.evaluate(each, case.t0, case.x0)[0]) for each in law.formulas]
+        if not all(value >= 0.0 for value in values):
             told.append(f"invariant {law.name!r}" + (f" of mode {law.of!r}" if law.of else ""))
     return "it lies beyond " + ", ".join(told) if told else "a guard is not finite"
 

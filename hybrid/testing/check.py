@@ -59,6 +59,7 @@ from hybrid.testing.invariance import (
 )
 from hybrid.testing.landing import LANDINGS, LIMITS, check_landings, check_limits
 from hybrid.testing.laws import declared_too, law_checks
+from hybrid.testing.outputs import OUTPUTS, check_outputs
 from hybrid.testing.reads import READS, check_reads, numbers_read
 from hybrid.testing.report import PropertyReport, SystemReport
 from hybrid.testing.saltation import (
@@ -225,6 +226,7 @@ def _properties(
         LANDINGS: check_landings,
         CROSSINGS: check_crossings,
         JUMPS: check_jumps,
+        OUTPUTS: check_outputs,
         UNITS: check_units,
         NAMES: check_names,
         ORDER: check_order,
@@ -241,6 +243,7 @@ def _properties(
     applies = {
         PERIOD: system.period is not None,
         ANGLES: bool(system.angles),
+        OUTPUTS: bool(system.outputs),
         LANDINGS: any(each.reset is not None for each in system.transitions),
         LIMITS: any(each.accumulates_to for each in system.transitions),
         ORDER: len(system.transitions) > 1 and not system.listed_order,

@@ -194,11 +194,11 @@ def _power(base: Quantity, exponent: Quantity) -> Quantity:
 def check_dimensions(system: HybridSystem) -> None:
     """Every model function fits the units of the system, which is found by computing with units.
 
-    The values of a field have the units of the state per time, those of a reset the units of the state, and a
-    period has the unit of time. What is added or compared has one unit; the argument of a sine or of an
-    exponential is a pure number. A parameter without a unit is a pure number. A number in the code may have
-    any unit, but for the factors 1, 2 and 1/2. Functions that cannot be traced, and texts that pint cannot
-    read, are left out.
+    The values of a field have the units of the state per time, those of a reset the units of the state, a
+    period has the unit of time, and an output the one that it is given. What is added or compared has one
+    unit; the argument of a sine or of an exponential is a pure number. A parameter without a unit is a pure
+    number. A number in the code may have any unit, but for the factors 1, 2 and 1/2. Functions that cannot be
+    traced, and texts that pint cannot read, are left out.
 
     Raises
     ------
@@ -246,6 +246,11 @@ def _wanted(system: HybridSystem) -> Iterator[tuple[str, Callable[..., Any], dic
             wanted = {f"the new {name}": unit for name, unit in state.items()}
         title = "condition" if kind == CONDITION else kind
         yield f"{title} of {function.owner[0].lower()}{function.owner[1:]}", function.value, wanted
+    for name, output in system.outputs.items():
+        wanted = {"the value": Quantity(unit_of(system.units[name]))} if name in system.units else {}
+        for formula in output.formulas:
+            title = output.title(formula)
+            yield f"{title[0].lower()}{title[1:]}", formula.function, wanted
     period: Any = system.period
     if callable(period):
         yield "period", lambda t, x, p: period(p), {"the value": time}

@@ -13,6 +13,7 @@ from hypothesis.errors import UnsatisfiedAssumption
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.jumps import Jump
 from hybrid.system.laws import Law, Laws
+from hybrid.system.outputs import function_in
 from hybrid.testing.case import Case, as_case, jump_told, lasting, matrix_told
 from hybrid.testing.ends import whole_run
 from hybrid.testing.errors import PropertyError, discard
@@ -115,7 +116,7 @@ def _check_value(case: Case, law: Law, kind: str) -> None:
     arc = whole_run(case)
     tolerance = TOLERANCE * _size_on(case, law, arc)
     for i in _rows(case, law, arc):
-        value = float(case.evaluate(law.function, arc.t[i], arc.x[i])[0])
+        value = _value(case, law, arc, i)
         if (value < -tolerance) if kind == "invariant" else (abs(value) > tolerance):
             mode, last = str(arc.mode[i]), str(arc.jumps.transition[arc.j[i] - 1]) if arc.j[i] else ""
             causes = [_of_mode(case, mode, kind)]
@@ -149,7 +150,7 @@ def _check_change(case: Case, law: Law, kind: str) -> None:
     arc, start, last = whole_run(case), 0.0, -1
     tolerance = TOLERANCE * _size_on(case, law, arc)
     for i in _rows(case, law, arc):
-        value = float(case.evaluate(law.function, arc.t[i], arc.x[i])[0])
+        value = _value(case, law, arc, i)
         jumps = last >= 0 and arc.j[i] != arc.j[last]
         # Jumps at once have no rows between them that count.
         follows = last >= 0 and (last == i - 1 or (jumps and arc.t[last] == arc.t[i]))
@@ -180,21 +181,26 @@ def _check_change(case: Case, law: Law, kind: str) -> None:
 
 def _rows(case: Case, law: Law, arc: HybridArc) -> Iterator[int]:
     """The rows of a run in the modes of a law; the example is discarded if there are none."""
-    modes = {name: law.holds_in(*case.names_of_mode(name)) for name in map(str, np.unique(arc.mode))}
+    visited = map(str, np.unique(arc.mode))
+    modes = {name: law.in_mode(*case.names_of_mode(name)) is not None for name in visited}
     if not any(modes.values()):
-        discard(f"no run was in mode {law.of!r}")
+        discard(
+            f"no run was in mode {law.of!r}" if law.of else f"{law.name!r} has no value in any mode of a run"
+        )
     lasts = lasting(arc)
     yield from (i for i in range(min(len(arc.t), MOST_ROWS)) if lasts[i] and modes[str(arc.mode[i])])
 
 
 def _integral(case: Case, law: Law, arc: HybridArc, i: int) -> float:
     """Integral of the flow of a law over the step that ends at row ``i``."""
-    assert law.flow is not None
+    flow = law.flow_in(*case.names_of_mode(str(arc.mode[i])))
+    if flow is None:
+        discard(f"the rate of {law.name!r} has no value in mode {str(arc.mode[i])!r}")
     h = arc.t[i] - arc.t[i - 1]
     if not h > 0.0:
         return 0.0
     times = arc.t[i - 1] + 0.5 * h * (1.0 + GAUSS_NODES)
-    rates = [case.evaluate(law.flow, t, x)[0] for t, x in zip(times, arc(times), strict=True)]
+    rates = [case.evaluate(flow, t, x)[0] for t, x in zip(times, arc(times), strict=True)]
     return float(0.5 * h * GAUSS_WEIGHTS @ rates)
 
 
@@ -204,7 +210,7 @@ def _check_across(case: Case, law: Law) -> None:
 
     def rule(t: float, minus: Any, plus: Any) -> Any:
         with np.errstate(all="ignore"):
-            return np.asarray(law.function(t, variables.state_view(minus), variables.state_view(plus), p))
+            return np.asarray(law.quantity(t, variables.state_view(minus), variables.state_view(plus), p))
 
     scale = np.tile(np.abs(whole_run(case).x).max(axis=0), 2)
     for jump in _jumps_of(case, law.of):
@@ -278,8 +284,18 @@ def _before(case: Case, arc: HybridArc, i: int) -> str:
 
 def _size_on(case: Case, law: Law, arc: HybridArc) -> float:
     """Size of the terms of a law on a run, in any mode."""
-    rows = np.unique(np.linspace(0, len(arc.t) - 1, ROWS_OF_SIZE).astype(int))
-    return float(max(sized(case, law.function, arc.t[i], arc.x[i], arc)[1][0] for i in rows))
+    functions = {
+        name: function_in(law.quantity, *case.names_of_mode(name)) for name in map(str, np.unique(arc.mode))
+    }
+    known = np.flatnonzero([functions[str(name)] is not None for name in arc.mode])
+    rows = known[np.unique(np.linspace(0, len(known) - 1, ROWS_OF_SIZE).astype(int))]
+    return float(max(sized(case, functions[str(arc.mode[i])], arc.t[i], arc.x[i], arc)[1][0] for i in rows))
+
+
+def _value(case: Case, law: Law, arc: HybridArc, i: int) -> float:
+    """The quantity of a law at row ``i`` of a run, where the law says something."""
+    function = law.in_mode(*case.names_of_mode(str(arc.mode[i])))
+    return float(case.evaluate(function, arc.t[i], arc.x[i])[0])
 
 
 def sized(case: Case, function: Any, t: float, x: Any, arc: HybridArc) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ from hybrid.expression.values import TraceError
 from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Reset, Transition
 from hybrid.system.functions import WholeReset, field_function
-from hybrid.system.graph import HybridSystem, as_system, functions_of, watched_by
+from hybrid.system.graph import HybridSystem, as_system, functions_of, laws_of, watched_by
 from hybrid.testing.errors import PropertyError, discard
 
 READS = "Every parameter is read, and no number stands in for one"
@@ -61,7 +61,7 @@ def _changed(system: HybridSystem, reset: Reset) -> set[str]:
 
 
 def check_reads(system: HybridSystem) -> None:
-    """Each parameter is read by a function of the model or a law, and by the name of no other number.
+    """Each parameter is read by a function of the model, an output or a law, and by the name of no number.
 
     It finds a number that is typed where a parameter belongs, and one that is read from a module or a closure
     although there is a parameter of that name: changing the parameter then changes nothing.
@@ -112,15 +112,17 @@ def numbers_read(system: HybridSystem) -> dict[str, float]:
 
 
 def _all_functions(system: HybridSystem) -> list[Callable[..., Any]]:
-    laws = system.laws
+    laws = laws_of(system)
     found = [function.value for _, function in functions_of(system)]
     if callable(system.period):
         period = system.period
         found.append(lambda t, x, p: period(p))
     for law in (each for some in laws.in_modes.values() for each in some):
-        found += [law.function, *([law.flow] if law.flow else [])]
+        found += law.formulas
+    for output in system.outputs.values():
+        found += output.functions
     for law in laws.across:
-        found.append(lambda t, x, p, law=law: law.function(t, x, x, p))
+        found.append(lambda t, x, p, law=law: law.quantity(t, x, x, p))
     return found
 
 

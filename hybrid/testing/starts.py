@@ -24,7 +24,7 @@ def start_in(case: Case, mode: str) -> tuple[float, ...] | None:
     a value and no invariant is negative.
     """
     names = case.names_of_mode(mode)
-    functions = [law.function for law in case.laws.equal if law.holds_in(*names)]
+    functions = [each for law in case.laws.equal if (each := law.in_mode(*names)) is not None]
     x = nearest_zero(case, functions, case.t0, np.array(case.x0, dtype=float))
     if x is None or evaluate(case.system.variables, case.rates_of(mode), case.t0, x, case.values) is None:
         return None
@@ -32,7 +32,8 @@ def start_in(case: Case, mode: str) -> tuple[float, ...] | None:
     if not all(guard_beyond(case, each, case.t0, x) < 0.0 for each in walls):
         return None
     for law in case.laws.invariant:
-        value = _value(case, law.function, case.t0, x) if law.holds_in(*names) else 0.0
+        function = law.in_mode(*names)
+        value = 0.0 if function is None else _value(case, function, case.t0, x)
         if value is None or value < 0.0:
             return None
     return tuple(float(each) for each in x)

@@ -193,6 +193,8 @@ def _measured(system: HybridSystem) -> Measured:
             attrs.evolve(each, guard=guard(each), reset=converted(each)) for each in system.transitions
         ],
         period=None if system.period is None else period,
+        units={},
+        outputs={},
         laws=Laws(),
     )
     return Measured(changed, tuple(units.values()), time)

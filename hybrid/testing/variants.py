@@ -84,6 +84,8 @@ def renamed(system: HybridSystem) -> HybridSystem:
         _RENAMED[system] = attrs.evolve(
             system,
             start=new_name(system.mode_names, start) if start in system.mode_names else start,
+            units={},
+            outputs={},
             laws=Laws(),
             modes=[attrs.evolve(mode, name=new_name(system.mode_names, mode.name)) for mode in system.modes],
             transitions=[
@@ -155,6 +157,8 @@ def _altered(system: HybridSystem) -> Altered:
             parameters={**system.parameters, **added},
             modes=modes,
             transitions=[*cuts, *transitions],
+            units={},
+            outputs={},
             laws=Laws(),
         ),
         stay,

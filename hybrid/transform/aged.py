@@ -81,6 +81,7 @@ class _Aging:
             held=(),
             modes=[self._mode(mode) for mode in original.modes],
             transitions=[self._transition(each) for each in original.transitions],
+            outputs={name: each.changed(self._function) for name, each in original.outputs.items()},
             derived_from=watched_below(original),
             growth=original.growth and _Growth(original.growth, original.growth.original),
         )

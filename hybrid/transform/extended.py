@@ -63,6 +63,7 @@ class _Extension:
             transitions=[self._transition(each) for each in original.transitions],
             period=self._period(),
             units={},
+            outputs={},
             laws=Laws(),
             notes=(),
             growth=None,

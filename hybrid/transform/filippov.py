@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from hybrid.errors import ModelError, shown
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
@@ -25,6 +26,7 @@ def filippov(
     name: str = "",
     units: Mapping[str, str] | None = None,
     angles: Mapping[str, float] | None = None,
+    outputs: Mapping[str, Any] | None = None,
     laws: Laws | None = None,
 ) -> HybridSystem:
     """The Filippov system ``f_b`` where ``h < 0``, ``f_a`` where ``h > 0``, with its sliding mode derived.
@@ -56,7 +58,7 @@ def filippov(
     switching
         Scalar function ``h(t, x, p)``, which must be traceable. Its gradient must not vanish where ``h = 0``.
         The sliding mode needs ``h`` to be twice differentiable.
-    start, period, name, units, angles, laws
+    start, period, name, units, angles, outputs, laws
         As for `HybridSystem`.
 
     Returns
@@ -145,6 +147,7 @@ def filippov(
         name=name,
         units={} if units is None else units,
         angles={} if angles is None else angles,
+        outputs={} if outputs is None else outputs,
         laws=Laws() if laws is None else laws,
         derived_from=Watched([below, above, switching]),
     )

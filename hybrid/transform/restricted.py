@@ -46,6 +46,8 @@ def restricted(
             modes=[_backwards(each) for each in modes] if backwards else modes,
             transitions=kept,
             start=None,
+            units={},
+            outputs={},
             laws=Laws(),
         )
         made[key] = made_by(found, restricted, system, *key)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from hybrid.system.elements import Function, Mode
 from hybrid.system.graph import HybridSystem, as_system
@@ -19,6 +20,7 @@ def from_equations(
     name: str = "",
     units: Mapping[str, str] | None = None,
     angles: Mapping[str, float] | None = None,
+    outputs: Mapping[str, Any] | None = None,
     laws: Laws | None = None,
 ) -> HybridSystem:
     """The hybrid system of one right-hand side with ``np.sign``, ``np.abs``, ``np.where`` and the like.
@@ -29,7 +31,7 @@ def from_equations(
     ----------
     field
         ``f(t, x, p)``, which returns the ``n`` derivatives. It must be traceable.
-    state, parameters, period, name, units, angles, laws
+    state, parameters, period, name, units, angles, outputs, laws
         As for `HybridSystem`.
 
     Raises
@@ -61,6 +63,7 @@ def from_equations(
             name=name,
             units={} if units is None else units,
             angles={} if angles is None else angles,
+            outputs={} if outputs is None else outputs,
             laws=Laws() if laws is None else laws,
         )
     )

@@ -45,6 +45,9 @@ def made():
     """The objects that methods and plots are called on."""
     return {
         "arc": hybrid.simulate(BALL, (1.0, 0.0), (0.0, 1.0)),
+        "slopes": hybrid.simulate(
+            BALL, (1.0, 0.0), (0.0, 1.0), sensitivities=("e",), tangent=True, samples=[0.5, 1.0]
+        ),
         "orbit": (orbit := hybrid.periodic_orbit(OSCILLATOR, (0.9, 1.0))),
         "flip": (flip := flip_of_the_converter()),
         "curve": hybrid.continue_bifurcation(flip, {"E": (24.5, 24.6), "V_ref": (11.2, 11.4)}),

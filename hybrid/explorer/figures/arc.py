@@ -82,7 +82,7 @@ class ArcFigures:
 
     def show(self, arc: HybridArc, start: Any) -> None:
         """Draw an arc, and the start."""
-        drawn = curves(arc)
+        drawn = curves(arc, self.states.names)
         self.begin = float(arc.t[0]) if len(arc.t) else 0.0
         self.length = float(arc.t[-1]) - self.begin if len(arc.t) else 0.0
         for mode in {*self.curves, *drawn}:
@@ -132,7 +132,7 @@ class ArcFigures:
         if arc is None:
             empty(self.orbit)
             return
-        drawn = list(curves(arc).values())
+        drawn = list(curves(arc, self.states.names).values())
         x, t = np.concatenate([x for _, x in drawn]), np.concatenate([t for t, _ in drawn])
         self.orbit.data = self.states.rows(x, t)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from hybrid.orbits.continuation.change import Change
 from hybrid.orbits.continuation.labelled import dataset_of
 from hybrid.orbits.continuation.place import Place
 from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.simulation.quantities import mode_indices, quantity, table_of
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
 
@@ -78,15 +79,17 @@ class Bifurcation:
 class Branch:
     """Periodic orbits in order along a branch; the sequence of transitions may change at its bifurcations.
 
+    ``branch["q"]`` is a component of the orbits' points, or an output at them.
+
     Attributes
     ----------
     system, name
         The model, as in :class:`hybrid.PeriodicOrbit`, and the name of the parameter.
     parameter
         Values of the parameter, ``(N,)``.
-    x0, mode
-        Points of the orbits ``(N, n)``, and the modes there ``(N,)``. The points of a forced system are all
-        at the same phase.
+    x0, mode, t0
+        Points of the orbits ``(N, n)``, and the modes and times there ``(N,)``. The points of a forced system
+        are all at the same phase.
     period
         Periods, ``(N,)``.
     multipliers
@@ -115,6 +118,7 @@ class Branch:
     parameter: np.ndarray
     x0: np.ndarray
     mode: np.ndarray
+    t0: np.ndarray
     period: np.ndarray
     multipliers: np.ndarray
     stable: np.ndarray
@@ -150,6 +154,24 @@ class Branch:
     def __len__(self) -> int:
         return len(self.parameter)
 
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A component of the state or an output at the points of the orbits, ``(N,)``.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no component and no output of that name.
+        """
+        return self._table([quantity("", name, self.system)])[:, 0]
+
+    def _table(self, names: Iterable[str]) -> np.ndarray:
+        """Components and outputs at the points of the orbits, ``(N, len(names))``."""
+        own = self.system.parameter_values(self.orbit(0).parameters)
+        values = np.tile(own, (len(self), 1))
+        values[:, [*self.system.parameters].index(self.name)] = self.parameter
+        modes = mode_indices(self.system, self.mode)
+        return table_of(self.system, [*names], self.t0, self.x0, modes, values)
+
     def __repr__(self) -> str:
         values = self.parameter
         span = f"{self.name} = {values.min():.6g} to {values.max():.6g}"
@@ -158,6 +180,8 @@ class Branch:
 
     def to_xarray(self) -> xarray.Dataset:
         """The branch over the axis ``point``, with the parameter as a coordinate, and its bifurcations.
+
+        If the system has outputs they are in ``outputs`` (axes ``point`` and ``output``).
 
         Multipliers are complex: ``.to_zarr`` saves them, netCDF cannot. :func:`hybrid.open_branch` makes a
         branch of it again.

@@ -210,12 +210,14 @@ def branch_of(items: list[Item], points: Points) -> Branch:
     family = passes[0].family
     where = [points.at(each) for each in passes]
     stable = {id(place): place.orbit.stable for place in places}
+    moments = [moment(each, *at) for each, at in zip(passes, where, strict=True)]
     branch = Branch(
         system=family.system,
         name=family.names[0],
         parameter=np.array([place.value for place in places]),
-        x0=np.array([moment(each, *at)[1] for each, at in zip(passes, where, strict=True)]),
+        x0=np.array([x for _, x in moments]),
         mode=np.array([mode_at(each, *at) for each, at in zip(passes, where, strict=True)]),
+        t0=np.array([points.t0 if family.forced else t for t, _ in moments]),
         period=np.array([each.period for each in passes]),
         multipliers=np.array([each.multipliers for each in passes]),
         stable=np.array([stable[id(place)] for place in places]),

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.simulation.labelled import Names, attributes
+from hybrid.orbits.labelled import table_at
+from hybrid.simulation.labelled import Names, attributes, with_outputs
 from hybrid.simulation.seal import sealed
 
 if TYPE_CHECKING:
@@ -54,4 +55,9 @@ def dataset_of(branch: Any) -> xarray.Dataset:
     }
     coords = {branch.name: ("point", branch.parameter, names.of(branch.name)), **names.coords()}
     made_by = attributes(KIND, branch.status, branch.system, branch.orbit(0).parameters)
-    return sealed(xarray.Dataset(variables, coords, {**made_by, "parameter": branch.name}))
+    made = xarray.Dataset(variables, coords, {**made_by, "parameter": branch.name})
+    tables = {
+        "outputs": ("point", branch._table(branch.system.outputs)),
+        "outputs_there": ("bifurcation", table_at(branch.system, [*branch.system.outputs], orbits)),
+    }
+    return sealed(with_outputs(made, branch.system, tables))

@@ -86,6 +86,7 @@ def open_branch(system: HybridSystem, saved: xarray.Dataset | str | os.PathLike[
         parameter=np.asarray(saved[name], dtype=float),
         x0=saved.x0.values,
         mode=saved["mode"].values.astype(str),
+        t0=saved.t0.values,
         period=saved.period.values,
         multipliers=saved.multipliers.values,
         stable=saved.stable.values,

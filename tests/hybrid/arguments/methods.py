@@ -27,7 +27,19 @@ def methods(made):
     arc = made["arc"]
     return [
         (call(contact.Hertz.duration, contact.Hertz(1e8), 90.0, 0.4), {"mass": POSITIVE, "speed": POSITIVE}),
-        (call(hybrid.HybridArc.__call__, arc, 0.5), {"t": [*NUMBERS, math.nan, -1.0, 2.0, [0.5, math.nan]]}),
+        (
+            call(hybrid.HybridArc.__call__, arc, 0.5),
+            {"t": [*NUMBERS, math.nan, -1.0, 2.0, [0.5, math.nan]], "name": NAME},
+        ),
+        *(
+            (call(getattr(hybrid.HybridArc, name), made["slopes"], "energy"), {"name": [None, *NAME]})
+            for name in (
+                "fundamental_of",
+                "sensitivity_of",
+                "sampled_fundamental_of",
+                "sampled_sensitivity_of",
+            )
+        ),
         (call(hybrid.PeriodicOrbit.arc, made["orbit"]), {"solver": SOLVER}),
         (
             call(hybrid.PeriodicOrbit.sensitivity, made["orbit"], ["w"]),

@@ -141,6 +141,18 @@ OF_BALL = [
 ]
 SOLVER = ["DOP853", hybrid.DOP853, 3, 0, False, "", [hybrid.DOP853()], Odd()]
 FUNCTION = ["a", 3, True, [1], np.array([1.0])]
+OUTPUTS = [
+    *FUNCTION,
+    Odd(),
+    {"f": 3},
+    {"f": "a"},
+    {"f": {}},
+    {"f": {"a": 3}},
+    {"f": {3: abs}},
+    {"": abs},
+    {3: abs},
+]
+OUTPUT_NAMES = [None, "a", 3, True, ["nope"], [3], [None], [[1]], Odd(), Hostile()]
 QUANTITY = [None, "1a", True, [1, None], 1j, Odd(), math.nan, -1.0, 0.0]
 GUARD = [None, "a", 3, lambda t, x, p: x.q, Guard, Odd()]
 LIST = [Hostile(), None, "a", 3, True, math.nan, Odd()]

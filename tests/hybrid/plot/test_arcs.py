@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import models
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition, simulate, stroboscopic_section
 from hybrid.plot import plot_arc, plot_phase, plot_section
-from hybrid.plot.orbits import second as _second
+from hybrid.plot.orbits import beside
 from hybrid.plot.style import COLOURS
 
 # A point on a circle that goes on at twice the speed below the axis, and counts its turns.
@@ -122,10 +122,18 @@ def test_samples_are_drawn_as_they_are():
 
 
 @pytest.mark.parametrize(
-    ("dimension", "first", "second"), [(1, 0, None), (2, 0, 1), (2, 1, 0), (3, 1, 2), (3, 2, 1)]
+    ("names", "first", "other"),
+    [
+        ("q", "q", None),
+        ("qv", "q", "v"),
+        ("qv", "v", "q"),
+        ("qvw", "v", "w"),
+        ("qvw", "w", "v"),
+        ("qv", "f", "q"),
+    ],
 )
-def test_the_component_beside_another(dimension, first, second):
-    assert _second(dimension, first) == second
+def test_the_component_beside_another(names, first, other):
+    assert beside(tuple(names), first) == other
 
 
 def test_dots_of_a_section_have_the_colours_of_their_modes():

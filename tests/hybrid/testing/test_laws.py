@@ -322,7 +322,10 @@ def test_a_mode_that_lasts_no_time_need_not_keep_its_laws():
     ("laws", "text"),
     [
         ({"invariant": {"flicht": ABOVE}}, "invariant: Mode 'flicht' does not exist. Modes: flight"),
-        ({"conserved": {"energy": 3.0}}, "conserved: 'energy' must be a function of (t, x, p); got 3.0"),
+        (
+            {"conserved": {"energy": 3.0}},
+            "conserved: 'energy' must be a function of (t, x, p) or the name of an output; got 3.0",
+        ),
         ({"equal": {"low": lambda t, x, p: x.q > 0}}, "a comparison has no size"),
         ({"invariant": {"low": lambda t, x, p: x.z}}, "State component 'z' does not exist"),
         ({"invariant": {"low": lambda t, x, p: (x.q, x.v)}}, "must return one number"),
