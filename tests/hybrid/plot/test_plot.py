@@ -86,7 +86,7 @@ def test_an_arc_of_samples_is_drawn_through_them():
 def test_phase_portrait_names_its_axes(bounces):
     axes = plot_phase(bounces, 1, "q")
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("v (m/s)", "q (m)")
-    with pytest.raises(ArgumentError, match="State component 'height' does not exist"):
+    with pytest.raises(ArgumentError, match="State component or output 'height' does not exist"):
         plot_phase(bounces, "height", "v")
     with pytest.raises(ArgumentError, match="State component 2 does not exist; the state has 2"):
         plot_phase(bounces, 2, "v")
