@@ -11,10 +11,13 @@ import numpy as np
 from hybrid.display.tables import counted, with_unit
 from hybrid.explorer.calls import Call, script
 from hybrid.explorer.figures.all import Figures
-from hybrid.explorer.pictures import Live, diagram_call, points_of_orbit
+from hybrid.explorer.figures.base import extent_of
+from hybrid.explorer.pictures import Live, diagram_call, points_of_orbit, start_row
 from hybrid.explorer.scene import Scene
 from hybrid.explorer.subject import Subject
 from hybrid.explorer.worker import Outcome
+from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.simulation.arc import HybridArc
 from hybrid.status import Status, StatusCode
 
 # Order of the pictures in the script.
@@ -27,8 +30,9 @@ class Board:
 
     Attributes
     ----------
-    live
-        The last section and arc.
+    live, orbit
+        The last section and arc; the orbit that is shown, between the scene where it was looked for and its
+        arc.
     results, calls, words
         By picture: what is shown, the calls that gave it, and what is said about it.
     progress
@@ -38,6 +42,7 @@ class Board:
     subject: Subject
     figures: Figures
     live: Live | None = None
+    orbit: tuple[Scene, PeriodicOrbit, HybridArc] | None = None
     results: dict[str, Any] = attrs.field(factory=dict)
     calls: dict[str, tuple[Call, ...]] = attrs.field(factory=dict)
     words: dict[str, str] = attrs.field(factory=dict)
@@ -57,7 +62,7 @@ class Board:
         self.results.pop(picture, None)
         self.words.pop(picture, None)
         if picture == "orbit":
-            self._draw_orbit(None, None, ())
+            self._clear_orbit()
         elif picture == "branch":
             self.figures.diagram.show_branch(None)
         elif picture == "basins":
@@ -90,14 +95,30 @@ class Board:
     def _show_live(self, outcome: Outcome) -> None:
         live = self.live = outcome.result
         self.calls["live"] = live.calls
-        start = list(live.scene.x0.values())
-        self.figures.arc.show(live.arc, start)
-        extent = np.ptp(live.arc.x, axis=0)
-        self.figures.section.show(live.points.x, live.points.mode, start, extent)
+        self._draw_live(live)
         ends = {"Section": live.points.status, "Arc": live.arc.status}
         self.words["live"] = " ".join(
             f"{what}: {status}" for what, status in ends.items() if _is_told(status)
         )
+
+    def _draw_live(self, live: Live) -> None:
+        names = self.figures.states.shown
+        start = start_row(self.subject, live.scene, names)
+        self.figures.arc.show(live.arc, start)
+        low, high = extent_of(np.column_stack([live.arc[name] for name in names]))
+        self.figures.section.show(live.points.table(names), live.points.mode, start, high - low)
+
+    def choose(self, scene: Scene) -> None:
+        """Draw the components and outputs of a scene."""
+        if not self.figures.choose(scene):
+            return
+        # What an output is at the points of results is computed once it is shown.
+        if self.live is not None:
+            self._draw_live(self.live)
+        if self.orbit is not None:
+            self._draw_orbit(*self.orbit)
+        if self.results.get("branch") is not None:
+            self.figures.diagram.show_branch(self.results["branch"])
 
     def _show_exponents(self, outcome: Outcome) -> None:
         call, spectrum = outcome.result
@@ -109,10 +130,11 @@ class Board:
         scene, call, orbit, arc = outcome.result
         self.calls["orbit"], self.results["orbit"] = (call,), orbit
         if arc is None:
-            self._draw_orbit(None, None, ())
+            self._clear_orbit()
             self.words["orbit"] = f"Orbit: {orbit.status}"
             return
-        self._draw_orbit(orbit, arc, points_of_orbit(self.subject, scene, orbit, arc))
+        self.orbit = scene, orbit, arc
+        self._draw_orbit(scene, orbit, arc)
         period = with_unit(f"{orbit.period:.6g}", self.subject.system.units.get("t"))
         moduli = np.sort(np.abs(orbit.multipliers))[::-1]
         if not self.subject.is_forced:
@@ -125,10 +147,17 @@ class Board:
             f"largest multiplier {largest:.6g}, {kind}."
         )
 
-    def _draw_orbit(self, orbit: Any, arc: Any, points: Any) -> None:
+    def _draw_orbit(self, scene: Scene, orbit: PeriodicOrbit, arc: HybridArc) -> None:
+        names = self.figures.states.shown
         self.figures.arc.show_orbit(arc)
-        self.figures.section.show_orbit(points)
+        self.figures.section.show_orbit(points_of_orbit(self.subject, scene, orbit, arc, names))
         self.figures.multipliers.show(orbit)
+
+    def _clear_orbit(self) -> None:
+        self.orbit = None
+        self.figures.arc.show_orbit(None)
+        self.figures.section.show_orbit(())
+        self.figures.multipliers.show(None)
 
     def _show_branch(self, outcome: Outcome) -> None:
         calls, status, branch = outcome.result

@@ -61,7 +61,7 @@ class Page:
         self.latest: Live | None = None
         self.jump, self.frame, self.seconds = -1, 0, 0.0
         figures = self.board.figures
-        figures.choose(self.scene)
+        self.board.choose(self.scene)
         self.widgets = Widgets(subject, self.scene, self)
         for made in (figures.arc.portrait, figures.section.made):
             made.on_event("tap", lambda event: self.start_here(event.x, event.y))
@@ -104,7 +104,7 @@ class Page:
         if not scene.low < scene.high:
             # One end is typed before the other: the diagram waits until both are there.
             self.say("address", f"The diagram needs from < to; got {scene.low:g} and {scene.high:g}.")
-        self.board.figures.choose(scene)
+        self.board.choose(scene)
         self.refresh()
 
     def start_here(self, x: float, y: float) -> None:
@@ -113,6 +113,11 @@ class Page:
         If the guards leave a choice of modes, the mode is that of the nearest point that is drawn.
         """
         scene = self.scene
+        if not {scene.across, scene.up} <= scene.x0.keys():
+            self.say(
+                "address", "Start: an output is no coordinate of a start. Choose components across and up."
+            )
+            return
         x0 = {**scene.x0, scene.across: float(x), scene.up: float(y)}
         mode = ""
         try:
@@ -138,7 +143,7 @@ class Page:
     def reset(self) -> None:
         """Return to the first scene."""
         self.scene, _ = from_query(self.subject, {})
-        self.board.figures.choose(self.scene)
+        self.board.choose(self.scene)
         self.refresh()
 
     def shared(self) -> dict[str, str]:
@@ -165,7 +170,8 @@ class Page:
             return
         self.jump = int(np.clip(self.jump + by, 0, live.arc.jump_count - 1))
         jump = live.arc.jumps[self.jump]
-        self.board.figures.arc.show_at(jump.t, jump.x_minus)
+        names = self.board.figures.states.shown
+        self.board.figures.arc.show_at(jump.t, [live.arc.jumps.before(name)[self.jump] for name in names])
         self._tell_jump(live)
 
     def tick(self) -> None:
@@ -177,7 +183,7 @@ class Page:
         times = np.linspace(arc.t[0], arc.t[-1], FRAMES)
         before, self.frame = times[self.frame], (self.frame + 1) % FRAMES
         now = times[self.frame]
-        self.board.figures.arc.show_at(now, arc(now))
+        self.board.figures.arc.show_at(now, [arc(now, name) for name in self.board.figures.states.shown])
         passed = np.flatnonzero((arc.jumps.t > before) & (arc.jumps.t <= now))
         if len(passed):
             self.jump = int(passed[-1])

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any
 
 import attrs
 import numpy as np
 
 import lyapunov
-from hybrid.errors import ArgumentError
+from hybrid.errors import ArgumentError, HybridError
 from hybrid.explorer.calls import Call, Written
 from hybrid.explorer.scene import BEGIN, JUMPS, PERIOD, Scene
 from hybrid.explorer.subject import Subject
@@ -36,7 +36,10 @@ NEAR = 0.1
 
 @attrs.frozen(eq=False)
 class Points:
-    """The section of a scene, where it was taken from a run's jumps or by a section of the library."""
+    """The section of a scene, where it was taken from a run's jumps or by a section of the library.
+
+    ``values`` gives a component or an output at the points, by its name.
+    """
 
     x: np.ndarray
     mode: np.ndarray
@@ -44,6 +47,11 @@ class Points:
     x_end: np.ndarray
     mode_end: str | None
     status: Status
+    values: Callable[[str], np.ndarray]
+
+    def table(self, names: Sequence[str]) -> np.ndarray:
+        """Components and outputs at the points, ``(N, len(names))``."""
+        return np.column_stack([self.values(name) for name in names])
 
 
 @attrs.frozen(eq=False)
@@ -100,19 +108,36 @@ def points_of(scene: Scene, taken: Section | HybridArc) -> Points:
     """The points of a section, and where the run goes on from."""
     if isinstance(taken, Section):
         if not len(taken):
-            return Points(taken.x, taken.mode, 0.0, np.empty(0), None, taken.status)
+            return Points(taken.x, taken.mode, 0.0, np.empty(0), None, taken.status, taken.__getitem__)
         end, mode_end = float(taken.t[-1]), str(taken.mode[-1])
-        return Points(taken.x, taken.mode, end, taken.x[-1], mode_end, taken.status)
+        return Points(taken.x, taken.mode, end, taken.x[-1], mode_end, taken.status, taken.__getitem__)
     jumps = taken.jumps
     names = np.array([each.source for each in taken.system.transitions])
     mode = names[jumps.transition_index[scene.transient :]] if len(jumps) else np.empty(0, dtype=str)
     x = jumps.x_minus[scene.transient :]
+
+    def values(name: str) -> np.ndarray:
+        return jumps.before(name)[scene.transient :]
+
     if len(taken.x):
-        return Points(x, mode, float(taken.t[-1]), taken.x[-1], str(taken.mode[-1]), taken.status)
+        return Points(x, mode, float(taken.t[-1]), taken.x[-1], str(taken.mode[-1]), taken.status, values)
     if not len(jumps):
-        return Points(x, mode, 0.0, np.empty(0), None, taken.status)
+        return Points(x, mode, 0.0, np.empty(0), None, taken.status, values)
     last_jump = jumps[-1]
-    return Points(x, mode, last_jump.t, last_jump.x_plus, last_jump.target, taken.status)
+    return Points(x, mode, last_jump.t, last_jump.x_plus, last_jump.target, taken.status, values)
+
+
+def start_row(subject: Subject, scene: Scene, names: Sequence[str]) -> list[float]:
+    """Components and outputs at the start of a scene; nan for outputs where a run cannot start."""
+    row = dict(scene.x0)
+    if not set(names) <= row.keys():
+        x0 = tuple(scene.x0.values())
+        try:
+            arc = simulate(subject.system, x0, (0.0, 0.0), **start_of(subject, scene))
+        except HybridError:
+            return [row.get(name, np.nan) for name in names]
+        row |= {name: float(arc[name][0]) for name in names if name not in row}
+    return [row[name] for name in names]
 
 
 def arc_call(subject: Subject, scene: Scene, points: Points) -> Call:
@@ -175,6 +200,7 @@ def diagram_call(subject: Subject, scene: Scene) -> Call:
         "transient": COLUMN_TRANSIENT,
         "section": COLUMN_POINTS,
         "at": at,
+        "outputs": [scene.across] if scene.across in subject.system.outputs else None,
     }
     system = Written(subject.system, "system")
     return Call("diagram", lyapunov.chart, (system, {scene.over: Written(values, text)}, scene.x0), keywords)
@@ -192,7 +218,8 @@ def diagram_job(subject: Subject, scene: Scene) -> Job:
 
     order = coarse_to_fine(scene.columns)
     parts = tuple(some(order[i : i + AT_ONCE]) for i in range(0, len(order), AT_ONCE))
-    return Job("diagram", values_key(scene, "columns", "section", "level"), parts)
+    key = values_key(scene, "columns", "section", "level"), call.keywords["outputs"] and scene.across
+    return Job("diagram", key, parts)
 
 
 def values_key(scene: Scene, *fields: str) -> Hashable:
@@ -235,18 +262,21 @@ def orbit_job(subject: Subject, scene: Scene, last: Callable[[], Live]) -> Job:
     return Job("orbit", (live_job(subject, scene).key, scene.periods), (found,))
 
 
-def points_of_orbit(subject: Subject, scene: Scene, orbit: PeriodicOrbit, arc: HybridArc) -> np.ndarray:
-    """Where an orbit meets the section of a scene, ``(N, n)``."""
+def points_of_orbit(
+    subject: Subject, scene: Scene, orbit: PeriodicOrbit, arc: HybridArc, names: Sequence[str]
+) -> np.ndarray:
+    """Components and outputs where an orbit meets the section of a scene, ``(N, len(names))``."""
     if scene.section == PERIOD:
         period = subject.unit_of_time(scene.values)
         # The arc begins at some phase and lasts a whole number of periods.
         times = period * (np.ceil(arc.t[0] / period) + np.arange(orbit.forcing_periods))
-        return arc(np.minimum(times, arc.t[-1]))
+        return np.column_stack([arc(np.minimum(times, arc.t[-1]), name) for name in names])
     if scene.section == JUMPS:
-        return arc.jumps.x_minus
+        return np.column_stack([arc.jumps.before(name) for name in names])
     value = arc[scene.section] - scene.level
     # The solver's own points before and after the crossing are near enough for a mark.
-    return arc.x[np.flatnonzero((value[:-1] < 0.0) & (value[1:] >= 0.0) & (np.diff(arc.j) == 0))]
+    rows = np.flatnonzero((value[:-1] < 0.0) & (value[1:] >= 0.0) & (np.diff(arc.j) == 0))
+    return np.column_stack([arc[name][rows] for name in names])
 
 
 def _recurrence(arc: HybridArc) -> tuple[tuple[float, ...], str, float]:
@@ -296,8 +326,8 @@ def basins_call(
     subject: Subject, scene: Scene, across: tuple[float, float], up: tuple[float, float], count: int
 ) -> Call:
     """The call that paints the basins over the plane of the section."""
-    if scene.across == scene.up:
-        raise ArgumentError("Basins: across and up must be two components; choose another one.")
+    if scene.across == scene.up or not {scene.across, scene.up} <= scene.x0.keys():
+        raise ArgumentError("Basins: across and up must be two components of the state; choose another one.")
     over: dict[str, Any] = dict(scene.x0)
     for name, (low, high) in ((scene.across, across), (scene.up, up)):
         text = f"np.linspace({low!r}, {high!r}, {count})"

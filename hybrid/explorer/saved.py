@@ -42,10 +42,8 @@ def saved_figure(
         case "time series":
             plot.plot_arc(live.arc, [scene.over_time], ax=ax)
         case "section":
-            system = live.arc.system
-            i, j = system.state_names.index(across), system.state_names.index(up)
-            names = Names(system.state_names, system.units)
-            ax.plot(live.points.x[:, i], live.points.x[:, j], ".", markersize=2, color=plot.COLOURS[0])
+            names = Names(live.arc.system.state_names, live.arc.system.units)
+            ax.plot(*live.points.table((across, up)).T, ".", markersize=2, color=plot.COLOURS[0])
             ax.set_xlabel(names.label(across))
             ax.set_ylabel(names.label(up))
         case "orbit":

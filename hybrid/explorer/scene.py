@@ -29,9 +29,9 @@ class Scene:
     values, x0, mode
         Parameters, start by component, and the mode there (empty: the mode that the start allows).
     across, up
-        Components of the portrait and of the section.
+        Components or outputs of the portrait and of the section.
     over_time
-        Component of the time series.
+        Component or output of the time series.
     section, level
         ``"once per period"``, ``"at each jump"``, or the component that passes the level upwards.
     points, transient
@@ -157,8 +157,7 @@ def from_query(subject: Subject, query: Mapping[str, str]) -> tuple[Scene, list[
 
 def checks_of(subject: Subject) -> dict[str, Check]:
     """How the text of each value is read, in an address and on the page: both have the same limits."""
-    names = subject.system.state_names
-    component = _one_of(names)
+    component = _one_of(subject.system.quantity_names)
     return {
         "mode": _one_of(("", *dict.fromkeys(each.part_of or each.name for each in subject.system.modes))),
         "across": component,

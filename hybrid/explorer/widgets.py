@@ -77,7 +77,7 @@ class Widgets:
     def __init__(self, subject: Subject, scene: Scene, acts: Acts) -> None:
         self.subject, self.acts = subject, acts
         self.following = False
-        units, names = subject.system.units, list(subject.system.state_names)
+        units, names = subject.system.units, list(subject.system.quantity_names)
         self.sliders: dict[str, Any] = {}
         self.fields: dict[str, Any] = {}
         # The parameter that the diagram is over comes first.
@@ -193,7 +193,7 @@ class Widgets:
     def _choices(self, names: list[str], scene: Scene) -> dict[str, Any]:
         modes = dict.fromkeys(each.part_of or each.name for each in self.subject.system.modes)
         sections = {
-            f"where {each} passes the level" if each in names else each: each
+            f"where {each} passes the level" if each in self.subject.system.state_names else each: each
             for each in section_names(self.subject)
         }
         span = "periods shown" if self.subject.is_forced else "typical times shown"

@@ -15,18 +15,20 @@ class Figures:
     """All figures of a page, by what they show."""
 
     def __init__(self, system: HybridSystem) -> None:
-        states = States(system.state_names)
+        states = self.states = States(system)
         self.arc = ArcFigures(system, states)
         self.section = SectionFigure(system, states)
         self.exponents = ExponentsFigure(system)
         self.diagram = DiagramFigures(system, states)
         self.multipliers = MultipliersFigure()
 
-    def choose(self, scene: Scene) -> None:
-        """Draw the components of a scene."""
+    def choose(self, scene: Scene) -> bool:
+        """Draw the components and outputs of a scene; whether results have to be shown anew for that."""
+        anew = self.states.choose(scene.across, scene.up, scene.over_time)
         self.arc.choose(scene.across, scene.up, scene.over_time)
         self.section.choose(scene.across, scene.up)
         self.diagram.choose(scene.across, scene.over)
+        return anew
 
     def hold(self, held: bool) -> None:
         """Keep portrait and section, in grey, to compare with; or let them go."""

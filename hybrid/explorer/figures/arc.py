@@ -1,4 +1,4 @@
-"""The arc in the plane of two components, and one component over time."""
+"""The arc in the plane of two components or outputs, and one of them over time."""
 
 from __future__ import annotations
 
@@ -6,7 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.explorer.figures.base import HELD, JUMP, ORBIT, START, Axes, States, blank, empty, source
+from hybrid.explorer.figures.base import (
+    HELD,
+    JUMP,
+    ORBIT,
+    START,
+    Axes,
+    States,
+    blank,
+    empty,
+    extent_of,
+    source,
+)
 from hybrid.plot.arcs import curves
 from hybrid.plot.style import colour_of
 from hybrid.simulation.arc import HybridArc
@@ -26,16 +37,15 @@ class ArcFigures:
     def __init__(self, system: HybridSystem, states: States) -> None:
         self.system, self.states = system, states
         self.labels = Names(system.state_names, system.units)
-        names = system.state_names
         self.curves: dict[int, Any] = {}
         self.held, self.start, self.orbit, self.at = (states.source() for _ in range(4))
-        ends = [f"{end}{i}" for end in ("a", "b") for i in range(len(states.names))]
+        ends = [f"{end}{i}" for end in ("a", "b") for i in range(len(states.columns))]
         self.jumps = source("t", *ends)
         self.portrait = blank("Phase portrait", "portrait", 320)
         self.series = blank("Time series", "series", 240)
         self.series.xaxis.axis_label = f"since the begin of the arc, {self.labels.label('t')}"
         self.begin = self.length = 0.0
-        first, second = states.components[0], states.components[-1]
+        first, second = states.columns[0], states.columns[-1]
         point = {"size": 10, "color": "white", "line_color": "black", "line_width": 2}
         # The renderers that follow the choice of axes.
         self.in_plane = [
@@ -53,10 +63,10 @@ class ArcFigures:
         )
         self.portrait_axes, self.series_axes = Axes(self.portrait), Axes(self.series)
         self.chosen: tuple[str, ...] = ()
-        self.extent = np.zeros((2, len(names)))
+        self.extent = np.zeros((2, len(states.names)))
 
     def choose(self, across: str, up: str, component: str) -> None:
-        """Draw these components."""
+        """Draw these components or outputs."""
         if (across, up, component) == self.chosen:
             return
         self.chosen = (across, up, component)
@@ -81,22 +91,21 @@ class ArcFigures:
         self.series_axes.show((0.0, self.length), ends[k], anew=anew)
 
     def show(self, arc: HybridArc, start: Any) -> None:
-        """Draw an arc, and the start."""
-        drawn = curves(arc, self.states.names)
+        """Draw an arc, and the start, a row of what is shown."""
+        drawn = curves(arc, self.states.shown)
         self.begin = float(arc.t[0]) if len(arc.t) else 0.0
         self.length = float(arc.t[-1]) - self.begin if len(arc.t) else 0.0
         for mode in {*self.curves, *drawn}:
-            t, x = drawn.get(mode, (np.empty(0), np.empty(0)))
-            self._curve_of(mode).data = self.states.rows(x, t - self.begin)
-        states = [x for _, x in drawn.values()]
-        if states:
-            both = np.concatenate(states)
-            self.extent = np.array([np.nanmin(both, axis=0), np.nanmax(both, axis=0)])
+            t, table = drawn.get(mode, (np.empty(0), np.empty(0)))
+            self._curve_of(mode).data = self.states.rows(table, t - self.begin)
+        if drawn:
+            self.extent = extent_of(self.states.whole(np.concatenate([table for _, table in drawn.values()])))
         self._fit()
         jumps = arc.jumps
         columns = {"t": np.asarray(jumps.t, dtype=float) - self.begin}
-        for end, x in (("a", jumps.x_minus), ("b", jumps.x_plus)):
-            columns |= {f"{end}{i}": np.ascontiguousarray(x[:, i]) for i in range(len(self.states.names))}
+        for end, side in (("a", jumps.before), ("b", jumps.after)):
+            table = self.states.whole(np.column_stack([side(name) for name in self.states.shown]))
+            columns |= {f"{end}{i}": np.ascontiguousarray(each) for i, each in enumerate(table.T)}
         self.jumps.data = columns
         self.start.data = self.states.rows(start)
 
@@ -124,7 +133,7 @@ class ArcFigures:
         parts = [each.data for each in (self.held, *self.curves.values())]
         self.held.data = {
             name: np.concatenate([np.asarray(part[name], dtype=float) for part in parts])
-            for name in ("t", *self.states.components)
+            for name in ("t", *self.states.columns)
         }
 
     def show_orbit(self, arc: HybridArc | None) -> None:
@@ -132,10 +141,10 @@ class ArcFigures:
         if arc is None:
             empty(self.orbit)
             return
-        drawn = list(curves(arc, self.states.names).values())
+        drawn = list(curves(arc, self.states.shown).values())
         x, t = np.concatenate([x for _, x in drawn]), np.concatenate([t for t, _ in drawn])
         self.orbit.data = self.states.rows(x, t)
 
-    def show_at(self, t: float, x: Any) -> None:
-        """Move the point that runs along the arc."""
-        self.at.data = self.states.rows(x, [t - self.begin])
+    def show_at(self, t: float, row: Any) -> None:
+        """Move the point that runs along the arc to a row of what is shown."""
+        self.at.data = self.states.rows(row, [t - self.begin])

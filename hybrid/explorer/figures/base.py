@@ -1,4 +1,4 @@
-"""What the figures share: an empty figure, and sources of states."""
+"""What the figures share: an empty figure, and sources of components and outputs."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from bokeh.models import ColumnDataSource, Range1d, Span
 from bokeh.plotting import figure
+
+from hybrid.system.graph import HybridSystem
 
 TOOLS = "pan,box_zoom,wheel_zoom,reset,save"
 # A range is this share wider than what it shows, and becomes narrower when so little of it is used.
@@ -95,27 +97,47 @@ def ends_of(*columns: Any) -> tuple[float, float]:
     return (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
 
 
-class States:
-    """Sources of states of a system.
+def extent_of(table: np.ndarray) -> np.ndarray:
+    """Least and largest finite value of each column, ``(2, columns)``; zeros where there is none."""
+    return np.array([ends_of(column) for column in table.T]).reshape(-1, 2).T
 
-    Every component is a column, so that another choice of axes needs no other data.
+
+class States:
+    """Sources of what a system has names for: its components, and its outputs.
+
+    Every name is a column, so that another choice of axes needs no other data. But an output is computed only
+    while it is ``shown``; until then its column is nan.
     """
 
-    def __init__(self, names: tuple[str, ...]) -> None:
-        self.names = names
-        self.components = [f"x{i}" for i in range(len(names))]
+    def __init__(self, system: HybridSystem) -> None:
+        self.names = system.quantity_names
+        self.columns = [f"x{i}" for i in range(len(self.names))]
+        self.own = self.shown = system.state_names
+
+    def choose(self, *chosen: str) -> bool:
+        """Show these names, and all components; whether there is an output among them that is new."""
+        before = self.shown
+        self.shown = (*self.own, *(name for name in self.names[len(self.own) :] if name in chosen))
+        return not set(self.shown) <= set(before)
 
     def column(self, name: str) -> str:
-        """The column of a component."""
-        return self.components[self.names.index(name)]
+        """The column of a name."""
+        return self.columns[self.names.index(name)]
 
     def source(self, *more: str) -> ColumnDataSource:
-        """A source without rows: the time ``t``, the components, and more columns."""
-        return source("t", *self.components, *more)
+        """A source without rows: the time ``t``, a column for every name, and more columns."""
+        return source("t", *self.columns, *more)
 
-    def rows(self, x: Any, t: Any = None) -> dict[str, Any]:
-        """States ``(N, n)`` and their times as columns."""
-        states = np.asarray(x, dtype=float).reshape(-1, len(self.names))
-        times = np.zeros(len(states)) if t is None else np.asarray(t, dtype=float)
-        columns = zip(self.components, np.ascontiguousarray(states.T), strict=True)
+    def whole(self, table: Any) -> np.ndarray:
+        """Rows of what is shown, ``(N, shown)``, as rows of all names, ``(N, names)``."""
+        given = np.asarray(table, dtype=float).reshape(-1, len(self.shown))
+        found = np.full((len(given), len(self.names)), np.nan)
+        found[:, [self.names.index(name) for name in self.shown]] = given
+        return found
+
+    def rows(self, table: Any, t: Any = None) -> dict[str, Any]:
+        """Rows of what is shown, ``(N, shown)``, and their times, as columns."""
+        whole = self.whole(table)
+        times = np.zeros(len(whole)) if t is None else np.asarray(t, dtype=float)
+        columns = zip(self.columns, np.ascontiguousarray(whole.T), strict=True)
         return {"t": times, **dict(columns)}

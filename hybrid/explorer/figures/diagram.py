@@ -10,6 +10,7 @@ from bokeh.plotting import figure
 
 from hybrid.explorer.figures.base import States, blank, empty, source, zero_line
 from hybrid.orbits.continuation.branch import Branch
+from hybrid.orbits.labelled import table_at
 from hybrid.plot.style import COLOURS
 from hybrid.simulation.labelled import Names
 from hybrid.system.graph import HybridSystem
@@ -44,7 +45,7 @@ class DiagramFigures:
         self.bifurcations = states.source("parameter", "kind", "marker")
         self.above = blank("Bifurcation diagram", "diagram", 300)
         self.below = blank("", "largest", 170, x_range=self.above.x_range)
-        component, colour = states.components[0], COLOURS[0]
+        component, colour = states.columns[0], COLOURS[0]
         marks = self.above.scatter(
             "parameter", component, source=self.bifurcations, marker="marker", size=11, color=COLOURS[3]
         )
@@ -87,7 +88,7 @@ class DiagramFigures:
             made.min_border_left, made.min_border_right = 70, 10
 
     def choose(self, component: str, over: str) -> None:
-        """Draw this component over this parameter."""
+        """Draw this component or output over this parameter."""
         for each in self.in_plane:
             each.glyph.y = self.states.column(component)
         self.above.yaxis.axis_label = self.labels.label(component)
@@ -107,7 +108,10 @@ class DiagramFigures:
         flat = points.reshape(-1, points.shape[2])
         told = np.isfinite(flat).all(axis=1)
         over = np.repeat(values, points.shape[1])[told]
-        self.points.stream({**self.states.rows(flat[told]), "parameter": over})
+        # The chart has the output of its axis alone.
+        outputs = chart.output.values if "section_outputs" in chart else ()
+        more = [_output(chart, each, outputs)[told] for each in self.states.shown[points.shape[2] :]]
+        self.points.stream({**self.states.rows(np.column_stack([flat[told], *more])), "parameter": over})
         largest, error = chart.exponents.values[:, 0], chart.standard_error.values[:, 0]
         columns = {
             "parameter": values,
@@ -128,13 +132,22 @@ class DiagramFigures:
             # A part reaches to the next one, so that the line has no gap.
             reaching = part.copy()
             reaching[1:] |= part[:-1]
-            x = np.where(reaching[:, None], branch.x0, np.nan)
-            made.data = {**self.states.rows(x), "parameter": branch.parameter}
+            table = np.where(reaching[:, None], branch._table(self.states.shown), np.nan)
+            made.data = {**self.states.rows(table), "parameter": branch.parameter}
         found = branch.bifurcations
         if found:
             self.bifurcations.data = {
-                **self.states.rows([each.orbit.x0 for each in found]),
+                **self.states.rows(
+                    table_at(branch.system, self.states.shown, [each.orbit for each in found])
+                ),
                 "parameter": [each.value for each in found],
                 "kind": [each.kind for each in found],
                 "marker": [MARKERS.get(each.kind, OTHER) for each in found],
             }
+
+
+def _output(chart: Any, name: str, outputs: Any) -> np.ndarray:
+    """An output at all points of a chart's section, ``(N,)``; nan if the chart does not have it."""
+    if name not in outputs:
+        return np.full(chart.section.shape[0] * chart.section.shape[1], np.nan)
+    return np.ravel(chart.section_outputs.sel(output=name).values)

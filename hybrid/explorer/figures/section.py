@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from bokeh.models import LinearColorMapper
 
-from hybrid.explorer.figures.base import HELD, ORBIT, START, Axes, States, blank, empty, source
+from hybrid.explorer.figures.base import HELD, ORBIT, START, Axes, States, blank, empty, extent_of, source
 from hybrid.plot.basins import NONE_COLOUR, VIOLATES_COLOUR
 from hybrid.plot.style import COLOURS, colour_of
 from hybrid.simulation.labelled import Names
@@ -42,7 +42,7 @@ class SectionFigure:
         )  # fmt: skip
         count = len(system.mode_names) + 1
         colours = LinearColorMapper(palette=[colour_of(i) for i in range(count)], low=-0.5, high=count - 0.5)
-        first, second = states.components[0], states.components[-1]
+        first, second = states.columns[0], states.columns[-1]
         held = self.made.scatter(first, second, source=self.held, size=2, marker="square", color=HELD)
         drawn = self.made.scatter(
             first, second,
@@ -65,7 +65,7 @@ class SectionFigure:
         self.extent = np.zeros((2, len(states.names)))
 
     def choose(self, across: str, up: str) -> None:
-        """Draw these components."""
+        """Draw these components or outputs."""
         if (across, up) == self.chosen:
             return
         self.chosen = (across, up)
@@ -79,33 +79,34 @@ class SectionFigure:
         ends = [(float(low), float(high)) for low, high in self.extent.T]
         self.axes.show(ends[i], ends[j], anew=anew)
 
-    def show(self, x: np.ndarray, mode: np.ndarray, start: Any, extent: np.ndarray) -> None:
-        """Draw points ``(N, n)`` with the names of their modes, and the start.
+    def show(self, table: np.ndarray, mode: np.ndarray, start: Any, extent: np.ndarray) -> None:
+        """Draw points, rows ``(N, shown)``, with the names of their modes, and the start.
 
-        The axes show at least a share of the ``extent (n,)`` of the arc.
+        The axes show at least a share of the ``extent (shown,)`` of the arc.
         """
         names, place = np.unique(mode, return_inverse=True)
         numbers = np.array([self.system.mode_index(str(name)) for name in names], dtype=float)
         column = numbers[place] if len(mode) else np.empty(0)
-        self.points.data = {**self.states.rows(x), "mode": column}
+        self.points.data = {**self.states.rows(table), "mode": column}
         self.start.data = self.states.rows(start)
-        if len(x):
+        if len(table):
             # No less than a share of the arc: the points of a periodic orbit differ by rounding alone.
-            low, high = x.min(axis=0), x.max(axis=0)
-            lacking = np.maximum(LEAST * extent - (high - low), 0.0) / 2
+            low, high = extent_of(self.states.whole(table))
+            least = LEAST * np.nan_to_num(self.states.whole(extent)[0])
+            lacking = np.maximum(least - (high - low), 0.0) / 2
             self.extent = np.array([low - lacking, high + lacking])
             self._fit()
 
     def hold(self, held: bool) -> None:
         """Keep what is drawn, in grey, to compare with; or let it go."""
         if held:
-            self.held.data = {name: self.points.data[name] for name in ("t", *self.states.components)}
+            self.held.data = {name: self.points.data[name] for name in ("t", *self.states.columns)}
         else:
             empty(self.held)
 
-    def show_orbit(self, x: Any) -> None:
-        """Mark the points of an orbit; none takes the marks away."""
-        self.orbit.data = self.states.rows(x)
+    def show_orbit(self, table: Any) -> None:
+        """Mark the points of an orbit, rows of what is shown; none takes the marks away."""
+        self.orbit.data = self.states.rows(table)
 
     @property
     def plane(self) -> tuple[tuple[float, float], tuple[float, float]]:
