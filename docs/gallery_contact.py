@@ -27,12 +27,10 @@ def vibroimpact(ax: Axes) -> None:
     for colour, (name, law) in zip(COLOURS, laws.items(), strict=False):
         start = (-1e-4, 0.0, speed / 2, -speed / 2)
         arc = simulate(models.vibroimpact(law), start, (0.0, 0.01), mode="free", parameters=alone)
-        t = np.linspace(arc.jumps[0].t, arc.jumps[1].t, 400)
-        x1, x2, v1, _ = arc(t).T
-        # The force follows from the deceleration of the first body.
-        force = -1000 * np.gradient(v1, t, edge_order=2)
-        depth = (x1 - x2) * 1e6
-        ax.plot(np.append(0, depth), np.append(0, force) / 1e3, color=colour, label=name)
+        # At its end the arc is free, and has no force.
+        t = np.linspace(arc.jumps[0].t, arc.jumps[1].t, 400)[:-1]
+        depth = (arc(t, "x1") - arc(t, "x2")) * 1e6
+        ax.plot(np.append(0, depth), np.append(0, arc(t, "force")) / 1e3, color=colour, label=name)
     ax.axvline(0, color="0.3", linewidth=0.9, linestyle=":", label="rigid")
     ax.set_xlabel("penetration (µm)")
     ax.set_ylabel("force (kN)")

@@ -8,6 +8,7 @@ from models.bouncing_ball import bouncing_ball
 from models.bouncing_table import bouncing_table
 from models.buck_converter import buck_converter
 from models.chua_circuit import chua_circuit
+from models.coulomb_stick_slip import coulomb_stick_slip
 from models.dosing_schedule import dosing_schedule
 from models.dry_friction_oscillator import dry_friction_oscillator
 from models.impact_oscillator import impact_oscillator
@@ -19,7 +20,7 @@ from models.sampled_loop import sampled_loop
 from models.simplest_walker import simplest_walker
 from models.slip_hopper import slip_hopper
 from models.solvable_oscillator import solvable_oscillator
-from models.stick_slip import coulomb_stick_slip, stick_slip
+from models.stick_slip import stick_slip
 from models.stop_oscillator import stop_oscillator
 from models.switched_arrival import switched_arrival
 from models.three_disk_billiard import three_disk_billiard

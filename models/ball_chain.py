@@ -20,6 +20,7 @@ def ball_chain() -> HybridSystem:
         State ``q1 <= q2 <= q3``, positions minus the diameters of the balls to the left, and velocities
         ``v1``, ``v2``, ``v3``; mode ``flight``; transitions ``left`` (balls 1 and 2) and ``right`` (2 and 3).
         Parameters: masses ``m1 = m2 = m3 = 1``, restitution ``e = 1``, ``0 <= e <= 1``; any consistent units.
+        Outputs: ``energy`` and ``momentum``.
 
     Notes
     -----
@@ -55,10 +56,11 @@ def ball_chain() -> HybridSystem:
             _collision("left", _left_gap, _left),
             _collision("right", _right_gap, _right),
         ],
+        outputs={"energy": _energy, "momentum": _momentum},
         laws=Laws(
             invariant={"gap on the left": _left_gap, "gap on the right": _right_gap, "1 - e": _loss},
-            conserved={"momentum": _momentum},
-            dissipated={"energy": _energy},
+            conserved=["momentum"],
+            dissipated=["energy"],
             across={
                 "left": {"momentum": _left_momentum, "restitution": _left_restitution},
                 "right": {"momentum": _right_momentum, "restitution": _right_restitution},

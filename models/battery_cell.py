@@ -40,6 +40,7 @@ def battery_cell() -> HybridSystem:
         from ``E_0 = 3`` V when empty to ``E_1 = 4.1`` V when full; ``R_0 = 0.03`` Ohm, ``R_1 = 0.02`` Ohm,
         ``C_1 = 1000`` F; cut-off ``u_min = 3`` V; largest current ``I = 8`` A. The period of the cycle is
         65 s.
+        Outputs: ``voltage`` at the terminals (V), and ``current`` (A).
 
     Notes
     -----
@@ -70,11 +71,16 @@ def battery_cell() -> HybridSystem:
         units={
             "s": "1", "v1": "V", "t": "s", "Q": "A*s", "E_0": "V", "E_1": "V", "R_0": "Ohm", "R_1": "Ohm",
             "C_1": "F", "u_min": "V", "I": "A",
+            "voltage": "V", "current": "A",
         },
         modes=[Mode("drive", _drive), Mode("off", _rest)],
         transitions=[Transition("drive", "off", Guard(_reserve, direction=-1), name="cut off")],
         start="drive",
         period=CYCLE[-1][0],
+        outputs={
+            "voltage": {"drive": _voltage, "off": _open_voltage},
+            "current": {"drive": _drawn_now, "off": _none},
+        },
         laws=Laws(
             invariant={"drive": {"voltage above the cut-off": _reserve}},
             balance={"drive": {"charge": (_charge, _drawn)}},
@@ -98,8 +104,24 @@ def _rest(t, x, p):
     return 0.0, -x.v1 / (p.R_1 * p.C_1)
 
 
+def _open_voltage(t, x, p):
+    return p.E_0 + (p.E_1 - p.E_0) * x.s - x.v1
+
+
+def _voltage(t, x, p):
+    return _open_voltage(t, x, p) - p.R_0 * _current(t, p)
+
+
 def _reserve(t, x, p):
-    return p.E_0 + (p.E_1 - p.E_0) * x.s - x.v1 - p.R_0 * _current(t, p) - p.u_min
+    return _voltage(t, x, p) - p.u_min
+
+
+def _drawn_now(t, x, p):
+    return _current(t, p)
+
+
+def _none(t, x, p):
+    return 0.0
 
 
 def _charge(t, x, p):

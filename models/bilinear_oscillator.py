@@ -20,6 +20,7 @@ def bilinear_oscillator() -> HybridSystem:
         State ``x`` (displacement), ``v`` (velocity); modes ``soft`` (``x < 0``), ``stiff``; transitions
         ``touch``, ``leave``; forcing period ``2 pi / w``. Dimensionless parameters: stiffnesses ``k1 = 1``
         and ``k2 = 10``, damping ``c = 0.1``, forcing amplitude ``A = 1`` and frequency ``w = 1``.
+        Outputs: ``energy``, and the force ``spring``.
 
     Notes
     -----
@@ -57,12 +58,13 @@ def bilinear_oscillator() -> HybridSystem:
             Transition("stiff", "soft", Guard(_displacement, direction=-1), name="leave"),
         ],
         period=_forcing_period,
+        outputs={"energy": _energy, "spring": {"soft": _soft_spring, "stiff": _stiff_spring}},
         laws=Laws(
             invariant={
                 "soft": {"displacement to the left": _to_the_left},
                 "stiff": {"displacement to the right": _displacement},
             },
-            balance={"energy": (_energy, _power)},
+            balance={"energy": ("energy", _power)},
             continuous=("touch", "leave"),
         ),
     )
@@ -78,6 +80,14 @@ def _stiff(t, x, p):
 
 def _field(t, x, p, k):
     return x.v, p.A * np.cos(p.w * t) - p.c * x.v - k * x.x
+
+
+def _soft_spring(t, x, p):
+    return -p.k1 * x.x
+
+
+def _stiff_spring(t, x, p):
+    return -p.k2 * x.x
 
 
 def _displacement(t, x, p):

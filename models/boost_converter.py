@@ -24,6 +24,7 @@ def boost_converter() -> HybridSystem:
         switch opens, ``tick``, where it closes, and ``stay`` for a tick that finds it closed. Parameters:
         input voltage ``E = 10`` V; inductor ``L = 1e-3`` H, capacitor ``C = 12e-6`` F, load ``R = 20`` Ohm;
         period ``T = 100e-6`` s; peak ``I_ref = 1.4`` A; slope of the ramp ``m_c = 0`` A/s.
+        Outputs: ``energy`` in coil and capacitor (J), and ``power`` of the load (W).
 
     Notes
     -----
@@ -64,7 +65,7 @@ def boost_converter() -> HybridSystem:
         },
         units={
             "i": "A", "v": "V", "r": "A", "t": "s", "E": "V", "L": "H", "C": "F", "R": "Ohm", "T": "s",
-            "I_ref": "A", "m_c": "A/s",
+            "I_ref": "A", "m_c": "A/s", "energy": "J", "power": "W",
         },
         modes=[Mode("on", _on), Mode("off", _off)],
         transitions=[
@@ -74,9 +75,10 @@ def boost_converter() -> HybridSystem:
         ],
         start="on",
         period=_period,
+        outputs={"energy": _energy, "power": _delivered},
         laws=Laws(
             invariant={"on": {"current in reserve": _reserve}},
-            balance={"energy": (_energy, _power)},
+            balance={"energy": ("energy", _power)},
             across={each: {"charge and current": _stored} for each in ("tick", "stay")},
         ),
     )  # fmt: skip
@@ -110,8 +112,12 @@ def _energy(t, x, p):
     return (p.L * x.i**2 + p.C * x.v**2) / 2
 
 
+def _delivered(t, x, p):
+    return x.v**2 / p.R
+
+
 def _power(t, x, p):
-    return p.E * x.i - x.v**2 / p.R
+    return p.E * x.i - _delivered(t, x, p)
 
 
 def _stored(t, minus, plus, p):

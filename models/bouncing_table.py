@@ -24,6 +24,7 @@ def bouncing_table() -> HybridSystem:
         ``flight``, ``rest``; transitions ``bounce``, ``liftoff``; forcing period ``2 pi / w``. Parameters:
         ``g = 9.81`` m/s^2; ``e = 0.5``, the coefficient of restitution; amplitude ``A = 0.01`` m and
         frequency ``w = 36`` rad/s of the table, with accelerations up to 1.32 g.
+        Outputs, both per mass: ``energy`` (J/kg), and ``force`` of the table on a ball at rest (N/kg).
 
     Notes
     -----
@@ -56,7 +57,16 @@ def bouncing_table() -> HybridSystem:
         name="bouncing ball on a vibrating table",
         state=("q", "v"),
         parameters={"g": 9.81, "e": 0.5, "A": 0.01, "w": 36.0},
-        units={"q": "m", "v": "m/s", "t": "s", "g": "m/s^2", "A": "m", "w": "rad/s"},
+        units={
+            "q": "m",
+            "v": "m/s",
+            "t": "s",
+            "g": "m/s^2",
+            "A": "m",
+            "w": "rad/s",
+            "energy": "J/kg",
+            "force": "N/kg",
+        },
         modes=[Mode("flight", _flight), Mode("rest", _rest)],
         transitions=[
             Transition(
@@ -77,10 +87,11 @@ def bouncing_table() -> HybridSystem:
             ),
         ],
         period=_forcing_period,
+        outputs={"energy": _energy, "force": {"rest": _weight}},
         laws=Laws(
-            invariant={"flight": {"height": _height}, "rest": {"force of the table": _weight}},
+            invariant={"flight": {"height": _height}, "rest": {"force of the table": "force"}},
             equal={"rest": {"height": _height, "velocity": _velocity}},
-            dissipated={"energy": (_energy, _power)},
+            dissipated={"energy": ("energy", _power)},
             across={"bounce": {"restitution": _restitution}},
         ),
     )

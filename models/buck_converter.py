@@ -26,6 +26,7 @@ def buck_converter() -> HybridSystem:
         ``E = 25`` V; inductor ``L = 20e-3`` H, capacitor ``C = 47e-6`` F, load ``R = 22`` Ohm; ramp from
         ``V_L = 3.8`` V to ``V_U = 8.2`` V in the period ``T = 400e-6`` s; reference ``V_ref = 11.3`` V and
         gain ``a = 8.4`` of the control voltage ``a (v - V_ref)``.
+        Outputs: ``energy`` in coil and capacitor (J), the ``control`` voltage and the ``ramp`` (V).
 
     Notes
     -----
@@ -61,7 +62,7 @@ def buck_converter() -> HybridSystem:
         },
         units={
             "v": "V", "i": "A", "t": "s", "E": "V", "L": "H", "C": "F", "R": "Ohm", "T": "s",
-            "V_L": "V", "V_U": "V", "V_ref": "V", "tau": "1",
+            "V_L": "V", "V_U": "V", "V_ref": "V", "tau": "1", "energy": "J", "control": "V", "ramp": "V",
         },
         modes=[Mode("off", _off), Mode("on", _on)],
         transitions=[
@@ -72,6 +73,7 @@ def buck_converter() -> HybridSystem:
             Transition("off", "off", Every("T"), restart, name="skip"),
         ],
         period=_period,
+        outputs={"energy": _energy, "control": _control_voltage, "ramp": _ramp},
         laws=Laws(
             invariant={
                 "phase of the ramp": _phase,
@@ -79,7 +81,7 @@ def buck_converter() -> HybridSystem:
                 "off": {"control voltage above the ramp": _excess},
                 "on": {"control voltage below the ramp": _shortage},
             },
-            balance={"off": {"energy": (_energy, _power_off)}, "on": {"energy": (_energy, _power_on)}},
+            balance={"off": {"energy": ("energy", _power_off)}, "on": {"energy": ("energy", _power_on)}},
             across={each: {"charge and current": _stored} for each in ("reopen", "saturate", "skip")},
         ),
     )  # fmt: skip
@@ -103,6 +105,14 @@ def _field(x, p, s):
 
 def _control(x, p):
     return p.a * (x.v - p.V_ref)
+
+
+def _control_voltage(t, x, p):
+    return _control(x, p)
+
+
+def _ramp(t, x, p):
+    return p.V_L + (p.V_U - p.V_L) * x.tau
 
 
 def _excess(t, x, p):

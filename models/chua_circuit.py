@@ -24,6 +24,7 @@ def chua_circuit() -> HybridSystem:
         ``z`` (scaled current of the inductor); modes ``left`` (``x < -1``), ``inner``, ``right`` (``x > 1``).
         Dimensionless parameters: ``alpha = 9``, ``beta = 100/7``, slopes ``m0 = -8/7`` of the resistor in the
         inner region and ``m1 = -5/7`` in the outer ones.
+        Outputs: ``energy``, and the current of the ``resistor``.
 
     Notes
     -----
@@ -65,13 +66,14 @@ def chua_circuit() -> HybridSystem:
             Transition("inner", "right", _breakpoint_at(1.0, +1)),
             Transition("right", "inner", _breakpoint_at(1.0, -1)),
         ],
+        outputs={"energy": _energy, "resistor": _resistor},
         laws=Laws(
             invariant={
                 "left": {"distance to the inner region": partial(_outside, -1.0)},
                 "inner": {"distance to the outer regions": _inside},
                 "right": {"distance to the inner region": partial(_outside, 1.0)},
             },
-            balance={"energy": (_energy, _power)},
+            balance={"energy": ("energy", _power)},
             continuous=("left->inner", "inner->left", "inner->right", "right->inner"),
         ),
     )
@@ -103,6 +105,9 @@ def _energy(t, x, p):
     return (x.x**2 / p.alpha + x.y**2 + x.z**2 / p.beta) / 2
 
 
+def _resistor(t, x, p):
+    return p.m1 * x.x + (p.m0 - p.m1) * (np.abs(x.x + 1) - np.abs(x.x - 1)) / 2
+
+
 def _power(t, x, p):
-    f = p.m1 * x.x + (p.m0 - p.m1) * (np.abs(x.x + 1) - np.abs(x.x - 1)) / 2
-    return -((x.x - x.y) ** 2) - f * x.x
+    return -((x.x - x.y) ** 2) - _resistor(t, x, p) * x.x

@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 from hybrid import Guard, Laws, Mode, Reset, Transition, arguments
 from models.contact_energy import (
     Bodies,
+    hertz_energy,
     hertz_force,
     hunt_crossley_force,
     hunt_crossley_power,
@@ -61,6 +62,10 @@ class ContactLaw(Protocol):
         """The transition ``impact`` and those that lead back to ``free``."""
         ...
 
+    def outputs(self, bodies: Bodies) -> dict[str, Any]:
+        """The energy, and the force of the contact if there is one."""
+        ...
+
     def laws(self, bodies: Bodies) -> Laws:
         """What is known of gap, energy and impact."""
         ...
@@ -99,6 +104,10 @@ class Rigid:
         collision = Reset(partial(_collided, bodies))
         return [Transition("free", "free", Guard(bodies.penetration, +1), collision, name="impact")]
 
+    def outputs(self, bodies: Bodies) -> dict[str, Any]:
+        """The energy; the force of an impact has no bound."""
+        return {"energy": bodies.energy}
+
     def laws(self, bodies: Bodies) -> Laws:
         """Energy, and the restitution."""
         restitution = partial(restitution_error, bodies)
@@ -136,6 +145,10 @@ class Hertz:
     def transitions(self, bodies: Bodies) -> list[Transition]:
         """``impact`` and ``release``."""
         return _in_and_out(bodies)
+
+    def outputs(self, bodies: Bodies) -> dict[str, Any]:
+        """Force and energy."""
+        return _soft_outputs(bodies, hertz_force)
 
     def laws(self, bodies: Bodies) -> Laws:
         """Energy with that of the contact; no force at the impact."""
@@ -242,6 +255,10 @@ class HuntCrossley:
         """``impact`` and ``release``."""
         return _in_and_out(bodies)
 
+    def outputs(self, bodies: Bodies) -> dict[str, Any]:
+        """Force and energy."""
+        return _soft_outputs(bodies, hunt_crossley_force)
+
     def laws(self, bodies: Bodies) -> Laws:
         """Energy with that of the contact, and its loss; no force at the impact."""
         return soft_laws(bodies, partial(hunt_crossley_power, bodies))
@@ -328,6 +345,11 @@ class KelvinVoigt:
             Transition("recovery", "free", Guard(bodies.penetration, -1), name="parting"),
             Transition("recovery", "contact", Guard(force, +1), name="return"),
         ]
+
+    def outputs(self, bodies: Bodies) -> dict[str, Any]:
+        """Force and energy; while the surfaces recover there is no force, and their energy is lost."""
+        energy = {"free": bodies.energy, "contact": partial(spring_energy, bodies), "recovery": bodies.energy}
+        return {"force": {"contact": partial(_force_between, bodies, kelvin_voigt_force)}, "energy": energy}
 
     def laws(self, bodies: Bodies) -> Laws:
         """Energy with that of the spring, and its loss; no force but at the impact."""
@@ -421,6 +443,14 @@ def _free(bodies: Bodies) -> Mode:
 def _pushed(bodies: Bodies, force: Callable[..., Any]) -> Mode:
     """The mode ``contact`` under a force of ``(penetration, rate, p)``."""
     return Mode("contact", partial(_pushed_apart, bodies, force))
+
+
+def _soft_outputs(bodies: Bodies, force: Callable[..., Any]) -> dict[str, Any]:
+    """Force and energy of a contact whose force begins and ends with the penetration."""
+    return {
+        "force": {"contact": partial(_force_between, bodies, force)},
+        "energy": {"free": bodies.energy, "contact": partial(hertz_energy, bodies)},
+    }
 
 
 def _apart(bodies, t, x, p):

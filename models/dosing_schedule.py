@@ -26,6 +26,7 @@ def dosing_schedule(times: Iterable[float] = (8.0, 20.0, 32.0, 44.0, 56.0, 68.0)
         State ``A`` (amount in the gut, mg), ``c`` (concentration in the plasma, mg/L); mode ``body``;
         transition ``dose``. Parameters: ``dose = 100`` mg; rates of absorption ``k_a = 1`` 1/h and of
         elimination ``k_e = 0.1`` 1/h; volume ``V = 30`` L.
+        Output: ``amount`` in the body (mg).
 
     Notes
     -----
@@ -56,11 +57,13 @@ def dosing_schedule(times: Iterable[float] = (8.0, 20.0, 32.0, 44.0, 56.0, 68.0)
         parameters={"dose": 100.0, "k_a": 1.0, "k_e": 0.1, "V": 30.0},
         units={
             "A": "mg", "c": "mg/L", "t": "h", "dose": "mg", "k_a": "1/h", "k_e": "1/h", "V": "L",
+            "amount": "mg",
         },
         modes=[Mode("body", _body)],
         transitions=[Transition("body", "body", At(times), Reset(_swallow), name="dose")],
+        outputs={"amount": _amount},
         laws=Laws(
-            balance={"amount in the body": (_amount, _elimination)},
+            balance={"amount in the body": ("amount", _elimination)},
             across={"dose": {"amount swallowed": _swallowed}},
         ),
     )  # fmt: skip

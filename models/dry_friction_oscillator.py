@@ -24,6 +24,7 @@ def dry_friction_oscillator() -> HybridSystem:
         stop, which lasts while ``abs(A cos(w t) - x) <= f``. Forcing period ``2 pi / w``. Dimensionless
         parameters: viscous damping ``c = 0``, friction ``f = 0.5``, forcing amplitude ``A = 1`` and frequency
         ``w = 0.8``.
+        Outputs: the force of ``friction``, and ``energy``.
 
     Notes
     -----
@@ -61,6 +62,14 @@ def dry_friction_oscillator() -> HybridSystem:
         above=partial(_field, +1),
         switching=_velocity,
         period=_forcing_period,
+        outputs={
+            "friction": {
+                "below": partial(_friction, -1),
+                "above": partial(_friction, +1),
+                "sliding": _holding,
+            },
+            "energy": _energy,
+        },
         laws=Laws(
             invariant={
                 "below": {"speed backwards": _backwards},
@@ -68,7 +77,7 @@ def dry_friction_oscillator() -> HybridSystem:
                 "sliding": {"friction in reserve": _hold},
             },
             equal={"sliding": {"velocity": _velocity}},
-            balance={"energy": (_energy, _power)},
+            balance={"energy": ("energy", _power)},
         ),
     )
 
@@ -109,6 +118,15 @@ def den_hartog_amplitude(f: float, A: float, w: float) -> float:
 
 def _field(sign, t, x, p):
     return x.v, p.A * np.cos(p.w * t) - x.x - p.c * x.v - sign * p.f
+
+
+def _friction(sign, t, x, p):
+    return -sign * p.f
+
+
+def _holding(t, x, p):
+    # The friction that holds the block carries the rest of the forces.
+    return x.x - p.A * np.cos(p.w * t)
 
 
 def _velocity(t, x, p):

@@ -20,6 +20,7 @@ def impact_oscillator() -> HybridSystem:
         State ``x`` (displacement), ``v`` (velocity); mode ``flight``; transition ``impact``; forcing
         period ``2 pi / w``. Dimensionless parameters: stiffness ``k = 1``, damping ``c = 0.1``, forcing
         amplitude ``A = 1`` and frequency ``w = 1``, stop ``d = 1``, restitution ``r = 0.8``.
+        Output: ``energy``.
 
     Notes
     -----
@@ -62,9 +63,10 @@ def impact_oscillator() -> HybridSystem:
             )
         ],
         period=_forcing_period,
+        outputs={"energy": _energy},
         laws=Laws(
             invariant={"distance to the stop": _gap},
-            balance={"energy": (_energy, _power)},
+            balance={"energy": ("energy", _power)},
             across={"impact": {"restitution": _restitution}},
         ),
     )

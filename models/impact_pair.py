@@ -20,6 +20,7 @@ def impact_pair() -> HybridSystem:
         State ``x`` (displacement from the middle of the box), ``v`` (velocity relative to the box); mode
         ``flight``; transitions ``left``, ``right``; forcing period ``2 pi / w``. Dimensionless parameters:
         amplitude ``A = 1`` and frequency ``w = 1`` of the box, clearance ``d = 4``, restitution ``r = 0.8``.
+        Output: ``energy``, as seen from the box.
 
     Notes
     -----
@@ -62,9 +63,10 @@ def impact_pair() -> HybridSystem:
             Transition("flight", "flight", Guard(_from_right, direction=+1), rebound, name="right"),
         ],
         period=_forcing_period,
+        outputs={"energy": _energy},
         laws=Laws(
             invariant={"distance to the walls": _gap},
-            balance={"energy": (_energy, _power)},
+            balance={"energy": ("energy", _power)},
             across={"left": {"restitution": _restitution}, "right": {"restitution": _restitution}},
         ),
     )

@@ -25,6 +25,7 @@ def rimless_wheel() -> HybridSystem:
         (rad/s); mode ``stance``; transitions ``step``, onto the next spoke downhill, and ``step back``.
         Parameters: ``g = 9.8`` m/s^2, spoke ``l = 1`` m, half angle between spokes ``alpha = pi / 8`` and
         slope ``gamma = 0.08``, in rad.
+        Output: ``force`` along the spoke per mass (N/kg); where it is negative the spoke pulls.
 
     Notes
     -----
@@ -63,6 +64,7 @@ def rimless_wheel() -> HybridSystem:
             "l": "m",
             "alpha": "rad",
             "gamma": "rad",
+            "force": "N/kg",
         },
         modes=[Mode("stance", _stance)],
         transitions=[
@@ -81,6 +83,7 @@ def rimless_wheel() -> HybridSystem:
                 name="step back",
             ),
         ],
+        outputs={"force": _push},
         laws=Laws(
             invariant={"angle to the next contact": _way},
             balance={"energy between steps": (_energy, _no_power)},
@@ -91,6 +94,10 @@ def rimless_wheel() -> HybridSystem:
 
 def _stance(t, x, p):
     return x.omega, p.g / p.l * np.sin(x.theta)
+
+
+def _push(t, x, p):
+    return p.g * np.cos(x.theta) - p.l * x.omega**2
 
 
 def _beyond_spoke(side, t, x, p):

@@ -25,6 +25,7 @@ def rocking_block() -> HybridSystem:
         corners; forcing period ``2 pi / w``. Parameters: angle ``alpha = 0.25`` rad of a diagonal to a side;
         ``p = 2`` rad/s, ``p^2 = 3 g / (4 R)`` with half the diagonal ``R``; restitution ``e = 0.9``; ground
         acceleration ``A = 0``, in units of g, and frequency ``w = 2 pi`` rad/s.
+        Output: ``energy`` per moment of inertia (1/s^2).
 
     Notes
     -----
@@ -61,16 +62,25 @@ def rocking_block() -> HybridSystem:
         name="rocking block",
         state=("theta", "omega"),
         parameters={"alpha": 0.25, "p": 2.0, "e": 0.9, "A": 0.0, "w": 2 * np.pi},
-        units={"theta": "rad", "omega": "rad/s", "t": "s", "alpha": "rad", "p": "rad/s", "w": "rad/s"},
+        units={
+            "theta": "rad",
+            "omega": "rad/s",
+            "t": "s",
+            "alpha": "rad",
+            "p": "rad/s",
+            "w": "rad/s",
+            "energy": "1/s^2",
+        },
         modes=[Mode("right", partial(_about, +1)), Mode("left", partial(_about, -1))],
         transitions=[
             Transition("right", "left", Guard(_tilt, direction=-1), loss, name="impact left"),
             Transition("left", "right", Guard(_tilt, direction=+1), loss, name="impact right"),
         ],
         period=_forcing_period,
+        outputs={"energy": _energy},
         laws=Laws(
             invariant={"right": {"tilt to the right": _tilt}, "left": {"tilt to the left": _tilt_left}},
-            balance={"energy": (_energy, _power)},
+            balance={"energy": ("energy", _power)},
             across={
                 "impact left": {"restitution": _restitution},
                 "impact right": {"restitution": _restitution},

@@ -23,6 +23,7 @@ def sampled_loop() -> HybridSystem:
         change; mode ``run``; transition ``sample``. Parameters: gain ``K = 1`` and time constant
         ``tau = 1`` s of the lag; sampling period ``T = 0.1`` s; gains ``Kp = 4`` and ``Ki = 6`` 1/s of the
         controller, its limit ``u_max = 1.5``; set point ``r = 1``. Only ``tau``, ``T`` and ``Ki`` have units.
+        Output: ``error`` between reference and ``y`` at any time.
 
     Notes
     -----
@@ -54,10 +55,11 @@ def sampled_loop() -> HybridSystem:
         state=("y",),
         held=("u", "e"),
         parameters={"K": 1.0, "tau": 1.0, "T": 0.1, "Kp": 4.0, "Ki": 6.0, "u_max": 1.5, "r": 1.0},
-        units={"y": "1", "u": "1", "e": "1", "t": "s", "tau": "s", "T": "s", "Ki": "1/s"},
+        units={"y": "1", "u": "1", "e": "1", "t": "s", "tau": "s", "T": "s", "Ki": "1/s", "error": "1"},
         modes=[Mode("run", _lag)],
         transitions=[Transition("run", "run", Every("T"), Reset(_sample), name="sample")],
         period=_period,
+        outputs={"error": _error},
         laws=Laws(invariant={"rest of the range above": _above, "rest of the range below": _below}),
     )
 
@@ -74,6 +76,10 @@ def _sample(t, x, p):
     error = p.r - x.y
     wanted = x.u + p.Kp * (error - x.e) + p.Ki * p.T * error
     return {"u": np.clip(wanted, -p.u_max, p.u_max), "e": error}
+
+
+def _error(t, x, p):
+    return p.r - x.y
 
 
 def _above(t, x, p):

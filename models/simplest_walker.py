@@ -29,6 +29,7 @@ def simplest_walker() -> HybridSystem:
         between the legs, rad) and the rates ``dtheta``, ``dphi``; modes ``behind`` and ``ahead``, named after
         the position of the swing foot; transitions ``passing`` and ``heelstrike``. Parameter: the slope
         ``gamma = 0.009`` rad. Time is in units of ``sqrt(l / g)``.
+        Outputs: ``energy``, and ``force`` of the stance leg, in units of the weight.
 
     Notes
     -----
@@ -67,9 +68,10 @@ def simplest_walker() -> HybridSystem:
             Transition("behind", "ahead", Guard(_height, direction=-1), name="passing"),
             Transition("ahead", "behind", Guard(_height, direction=+1), Reset(_exchange), name="heelstrike"),
         ],
+        outputs={"energy": _energy, "force": _push},
         laws=Laws(
             invariant={"behind": {"swing foot behind": _height}, "ahead": {"swing foot ahead": _depth}},
-            balance={"energy between steps": (_energy, _no_power)},
+            balance={"energy between steps": ("energy", _no_power)},
             continuous=("passing",),
             across={
                 "heelstrike": {
@@ -85,6 +87,10 @@ def simplest_walker() -> HybridSystem:
 def _swing(t, x, p):
     turn = np.sin(x.theta - p.gamma)
     return x.dtheta, x.dphi, turn, turn + (x.dtheta**2 - np.cos(x.theta - p.gamma)) * np.sin(x.phi)
+
+
+def _push(t, x, p):
+    return np.cos(x.theta - p.gamma) - x.dtheta**2
 
 
 def _height(t, x, p):

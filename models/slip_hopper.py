@@ -26,6 +26,7 @@ def slip_hopper() -> HybridSystem:
         off downwards (``fall``) or if its apex is below ``l0 sin(alpha)`` (``low apex``). Parameters: mass
         ``m = 80`` kg, leg stiffness ``k = 20000`` N/m, leg length at rest ``l0 = 1`` m, angle of attack
         ``alpha = 68 deg`` (in rad), ``g = 9.81`` m/s^2.
+        Outputs: ``force`` of the leg (N), in stance, and ``energy`` (J).
 
     Notes
     -----
@@ -66,6 +67,8 @@ def slip_hopper() -> HybridSystem:
             "l0": "m",
             "alpha": "rad",
             "g": "m/s^2",
+            "force": "N",
+            "energy": "J",
         },
         modes=[Mode("descent", _flight), Mode("stance", _stance), Mode("ascent", _flight)],
         transitions=[
@@ -86,17 +89,17 @@ def slip_hopper() -> HybridSystem:
             Transition("ascent", "descent", Guard(_climb, direction=-1, when=_is_high), name="apex"),
             Transition("ascent", None, Guard(_climb, direction=-1, when=_is_low), name="low apex"),
         ],
+        outputs={
+            "force": {"stance": _push},
+            "energy": {"descent": _energy, "stance": _energy_on_leg, "ascent": _energy},
+        },
         laws=Laws(
             invariant={
                 "descent": {"height of the foot": _foot},
                 "stance": {"compression of the leg": _compression},
                 "ascent": {"climb": _climb},
             },
-            conserved={
-                "descent": {"energy": _energy},
-                "stance": {"energy": _energy_on_leg},
-                "ascent": {"energy": _energy},
-            },
+            conserved=["energy"],
             continuous=("takeoff", "apex"),
             across={"touchdown": {"length of the leg": _stretch, "velocity": _change}},
         ),
@@ -146,6 +149,10 @@ def _is_low(t, x, p):
 
 def _compression(t, x, p):
     return p.l0 - np.hypot(x.x, x.y)
+
+
+def _push(t, x, p):
+    return p.k * _compression(t, x, p)
 
 
 def _energy(t, x, p):

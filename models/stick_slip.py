@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition, filippov
+from hybrid import HybridSystem, Laws, filippov
 
 
 def stick_slip() -> HybridSystem:
@@ -21,6 +21,7 @@ def stick_slip() -> HybridSystem:
         switching function ``v - belt``: ``below`` slips behind the belt, ``above`` ahead of it, ``sliding``
         sticks to it. Dimensionless parameters: belt speed ``belt = 0.2``, friction at rest ``Fs = 1``, decay
         of the friction with speed ``delta = 3``.
+        Outputs: ``friction`` on the block, and ``energy`` as seen from the belt.
 
     Notes
     -----
@@ -49,6 +50,10 @@ def stick_slip() -> HybridSystem:
         below=_behind,
         above=_ahead,
         switching=_slip,
+        outputs={
+            "friction": {"below": _pull_on, "above": _hold_back, "sliding": _position},
+            "energy": _energy,
+        },
         laws=Laws(
             invariant={
                 "below": {"slip backwards": _slip_back},
@@ -56,73 +61,26 @@ def stick_slip() -> HybridSystem:
                 "sliding": {"friction in reserve": _hold},
             },
             equal={"sliding": {"slip": _slip}},
-            balance={"energy seen from the belt": (_energy, _power)},
-        ),
-    )
-
-
-def coulomb_stick_slip() -> HybridSystem:
-    r"""Block of unit mass and stiffness on a belt, with static and smaller kinetic friction (Coulomb).
-
-    .. math::
-
-        \text{stick: } \dot x = b \text{ until } x = F_s; \qquad
-        \text{slip: } \ddot x + x = F_k \text{ until } \dot x = b
-
-    Returns
-    -------
-    HybridSystem
-        State ``x`` (displacement), ``v`` (velocity); modes ``stick`` and ``slip``; transitions ``release``
-        and ``catch``. Dimensionless parameters: belt speed ``belt = 0.2``, static friction ``Fs = 1`` and
-        kinetic friction ``Fk = 0.5``.
-
-    Notes
-    -----
-    - After a stick the block never slips ahead of the belt, nor does a block that slips with
-      ``hypot(x - Fk, v) < Fs + Fk``. The model does not describe slip ahead of the belt.
-    - With ``D = Fs - Fk`` the slip is ``x = Fk + D cos(s) + belt sin(s)``, lasts
-      ``2 (pi - arctan(D / belt))`` and ends at ``Fk - D``; the stick lasts ``2 D / belt``.
-    - The saltation of the release is ``[[1, 0], [-D / belt, 1]]``, that of the catch ``[[1, 0], [0, 0]]``;
-      the multipliers of the limit cycle are ``{1, 0}``.
-
-    References
-    ----------
-    As for :func:`stick_slip`.
-
-    Examples
-    --------
-    >>> import models
-    >>> from hybrid import simulate
-    >>> arc = simulate(models.coulomb_stick_slip(), (0.5, 0.2), (0.0, 10.0), mode="stick")
-    >>> arc.jumps[0].transition, round(float(arc.jumps[0].x_minus[0]), 9)
-    ('release', 1.0)
-    """
-    return HybridSystem(
-        name="stick-slip with Coulomb's friction",
-        state=("x", "v"),
-        parameters={"belt": 0.2, "Fs": 1.0, "Fk": 0.5},
-        modes=[
-            Mode("stick", _stick),
-            Mode("slip", _slipping),
-        ],
-        transitions=[
-            Transition("stick", "slip", Guard(_pull, direction=+1), name="release"),
-            Transition("slip", "stick", Guard(_slip, direction=+1), Reset(_caught), name="catch"),
-        ],
-        laws=Laws(
-            invariant={
-                "stick": {"friction in reserve": _hold},
-                "slip": {"slip backwards": _slip_back, "friction in reserve when caught": _hold_later},
-            },
-            equal={"stick": {"slip": _slip}},
-            balance={"energy seen from the belt": (_energy, _coulomb_power)},
-            across={"catch": {"displacement": _displacement}},
+            balance={"energy seen from the belt": ("energy", _power)},
         ),
     )
 
 
 def _friction(p, speed):
     return p.Fs / (1 + p.delta * speed)
+
+
+def _pull_on(t, x, p):
+    return _friction(p, p.belt - x.v)
+
+
+def _hold_back(t, x, p):
+    return -_friction(p, x.v - p.belt)
+
+
+def _position(t, x, p):
+    # While the block sticks, friction balances the spring.
+    return x.x
 
 
 def _behind(t, x, p):
@@ -137,33 +95,12 @@ def _slip(t, x, p):
     return x.v - p.belt
 
 
-def _stick(t, x, p):
-    return p.belt, 0.0
-
-
-def _slipping(t, x, p):
-    return x.v, p.Fk - x.x
-
-
-def _pull(t, x, p):
-    return x.x - p.Fs
-
-
-def _caught(t, x, p):
-    return x.x, p.belt
-
-
 def _slip_back(t, x, p):
     return p.belt - x.v
 
 
 def _hold(t, x, p):
     return p.Fs - np.abs(x.x)
-
-
-def _hold_later(t, x, p):
-    # A block that slips is caught at x = Fk - sqrt((x - Fk)^2 + v^2 - belt^2), which must be above -Fs.
-    return (p.Fs + p.Fk) ** 2 - (x.x - p.Fk) ** 2 - x.v**2 + p.belt**2
 
 
 def _energy(t, x, p):
@@ -173,11 +110,3 @@ def _energy(t, x, p):
 def _power(t, x, p):
     speed = np.abs(x.v - p.belt)
     return p.belt * x.x - _friction(p, speed) * speed
-
-
-def _coulomb_power(t, x, p):
-    return p.belt * x.x - p.Fk * np.abs(x.v - p.belt)
-
-
-def _displacement(t, minus, plus, p):
-    return plus.x - minus.x

@@ -28,6 +28,7 @@ def stop_oscillator() -> HybridSystem:
         ``touch right``, ``leave right``, ``touch left``, ``leave left``; forcing period ``2 pi / w``.
         Dimensionless parameters: stiffness ``k = 1``, damping ``c = 0.1``, gap ``d = 1``, stiffness
         ``ks = 10`` and preload ``F0 = 0`` of a stop, forcing amplitude ``A = 1`` and frequency ``w = 1``.
+        Outputs: ``energy``, and ``force`` of the stop that is touched.
 
     Notes
     -----
@@ -76,13 +77,14 @@ def stop_oscillator() -> HybridSystem:
             Transition("left", "free", Guard(_at_left, direction=+1), name="leave left"),
         ],
         period=_forcing_period,
+        outputs={"energy": _energy, "force": {"right": partial(_stop, +1), "left": partial(_stop, -1)}},
         laws=Laws(
             invariant={
                 "free": {"distance to the stops": _gap},
                 "right": {"compression of the right stop": _at_right},
                 "left": {"compression of the left stop": _pressed_left},
             },
-            balance={"energy": (_energy, _power)},
+            balance={"energy": ("energy", _power)},
         ),
     )
 
@@ -90,6 +92,10 @@ def stop_oscillator() -> HybridSystem:
 def _field(side, t, x, p):
     stop = side * p.F0 + p.ks * (x.x - side * p.d) if side else 0.0
     return x.v, p.A * np.cos(p.w * t) - p.c * x.v - p.k * x.x - stop
+
+
+def _stop(side, t, x, p):
+    return -(side * p.F0 + p.ks * (x.x - side * p.d))
 
 
 def _at_right(t, x, p):

@@ -23,6 +23,7 @@ def switched_arrival() -> HybridSystem:
         State ``x1``, ``x2``, ``x3``, the work in the buffers; modes ``fill1``, ``fill2``, ``fill3``, one per
         buffer. Parameters: ``rho1 = rho2 = rho3 = 1/3``, the rates at which the buffers drain (work per unit
         of time). The server's rate is their sum, so the total work is constant.
+        Output: ``work`` in all buffers.
 
     Notes
     -----
@@ -62,9 +63,10 @@ def switched_arrival() -> HybridSystem:
         transitions=[
             Transition(f"fill{j}", f"fill{i}", _empties(i)) for j in BUFFERS for i in BUFFERS if i != j
         ],
+        outputs={"work": _total},
         laws=Laws(
             invariant={f"work in buffer {i}": partial(_content, i) for i in BUFFERS},
-            conserved={"total work": _total},
+            conserved={"total work": "work"},
         ),
     )
 

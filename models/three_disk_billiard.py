@@ -22,6 +22,7 @@ def three_disk_billiard() -> HybridSystem:
     HybridSystem
         State ``x``, ``y``, ``vx``, ``vy``; mode ``flight``; transitions ``disk1`` (above), ``disk2`` (left),
         ``disk3`` (right). Parameters: radius ``a = 1`` and distance between centres ``R = 6``, both lengths.
+        Output: ``speed``.
 
     Notes
     -----
@@ -66,9 +67,10 @@ def three_disk_billiard() -> HybridSystem:
             )
             for k in range(3)
         ],
+        outputs={"speed": _speed},
         laws=Laws(
             invariant={f"gap to disk{k + 1}": partial(_gap, k) for k in range(3)},
-            conserved={"speed": _speed},
+            conserved=["speed"],
             across={
                 f"disk{k + 1}": {"angular momentum about its centre": partial(_turn, k)} for k in range(3)
             },

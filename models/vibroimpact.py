@@ -36,6 +36,7 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
         ``xi1 = xi2 = 0.036``; drive ``P = 500`` N, ``phi0 = 0``, ``omega = 7.40`` rad/s; gap at rest
         ``D = 0.05`` m; contact stiffness ``K = 1.537e11`` N/m^(3/2), from
         :func:`models.contact.hertz_stiffness`.
+        Outputs: ``force`` of the contact (N), in contact; ``energy`` (J); ``drive`` (N).
 
     Notes
     -----
@@ -76,6 +77,10 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
         wanted = "be a law of contact from models.contact, for example Rigid(e=0.8)"
         raise arguments.refusal("contact", wanted, contact)
     bodies = Bodies(_field, _penetration, _rate, _collided, _energy, _power)
+    outputs = {**contact.outputs(bodies), "drive": _drive}
+    units = {
+        name: unit for name, unit in (("force", "N"), ("energy", "J"), ("drive", "N")) if name in outputs
+    }
     laws = Laws(balance={"momentum": (_momentum, _outer_force)}, across={"impact": {"momentum": _impulse}})
     return HybridSystem(
         name="vibro-impact",
@@ -89,11 +94,12 @@ def vibroimpact(contact: ContactLaw | None = None) -> HybridSystem:
         units={
             "x1": "m", "x2": "m", "v1": "m/s", "v2": "m/s", "t": "s",
             "m1": "kg", "m2": "kg", "omega1": "rad/s", "omega2": "rad/s",
-            "P": "N", "phi0": "rad", "omega": "rad/s", "D": "m", **contact.units,
+            "P": "N", "phi0": "rad", "omega": "rad/s", "D": "m", **contact.units, **units,
         },
         modes=contact.modes(bodies),
         transitions=contact.transitions(bodies),
         period=_forcing_period,
+        outputs=outputs,
         laws=laws.joined(contact.laws(bodies)),
     )  # fmt: skip
 
@@ -108,6 +114,10 @@ def _rate(t, x, p):
 
 def _forcing_period(p):
     return 2 * np.pi / p.omega
+
+
+def _drive(t, x, p):
+    return p.P * np.cos(p.omega * t + p.phi0)
 
 
 def _field(t, x, p, Fcon):

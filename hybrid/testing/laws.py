@@ -26,6 +26,7 @@ NUDGE = 1e-3
 ROWS_OF_SIZE = 20
 # Laws are judged on the first rows of a run: more of them show nothing new.
 MOST_ROWS = 1000
+NOWHERE = "{!r} has no value in any mode of a run"
 GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)
 KINDS = {
     "invariant": "is non-negative",
@@ -184,9 +185,7 @@ def _rows(case: Case, law: Law, arc: HybridArc) -> Iterator[int]:
     visited = map(str, np.unique(arc.mode))
     modes = {name: law.in_mode(*case.names_of_mode(name)) is not None for name in visited}
     if not any(modes.values()):
-        discard(
-            f"no run was in mode {law.of!r}" if law.of else f"{law.name!r} has no value in any mode of a run"
-        )
+        discard(NOWHERE.format(law.name) if law.of is None else f"no run was in mode {law.of!r}")
     lasts = lasting(arc)
     yield from (i for i in range(min(len(arc.t), MOST_ROWS)) if lasts[i] and modes[str(arc.mode[i])])
 
@@ -288,6 +287,8 @@ def _size_on(case: Case, law: Law, arc: HybridArc) -> float:
         name: function_in(law.quantity, *case.names_of_mode(name)) for name in map(str, np.unique(arc.mode))
     }
     known = np.flatnonzero([functions[str(name)] is not None for name in arc.mode])
+    if not len(known):
+        discard(NOWHERE.format(law.name))
     rows = known[np.unique(np.linspace(0, len(known) - 1, ROWS_OF_SIZE).astype(int))]
     return float(max(sized(case, functions[str(arc.mode[i])], arc.t[i], arc.x[i], arc)[1][0] for i in rows))
 

@@ -8,6 +8,7 @@ import pytest
 
 import models
 from hybrid import Guard, Laws, Reset
+from hybrid.system.graph import laws_of
 from hybrid.testing import Case, PropertyError, check_laws, check_system
 from hybrid.testing.crossings import CROSSINGS
 from hybrid.testing.dimensions import DIMENSIONS
@@ -308,7 +309,7 @@ MISTAKES = {
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_breaks_a_law(mistake):
     system, change, (mode, x0, end), law = MISTAKES[mistake]
-    check = law_checks(system.laws)[law]
+    check = law_checks(laws_of(system))[law]
     check(Case(system, system.parameters, mode, x0, 0.0, end))
     with pytest.raises(PropertyError) as caught:
         check(Case(change(system), system.parameters, mode, x0, 0.0, end))
