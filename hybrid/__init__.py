@@ -26,6 +26,7 @@ from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.periodic_orbit import periodic_orbit
 from hybrid.orbits.sections import Section, poincare_section, stroboscopic_section
 from hybrid.simulation.arc import HybridArc
+from hybrid.simulation.end import ArcEnd, open_end
 from hybrid.simulation.jumps import Grazing, Jump
 from hybrid.simulation.saltation import saltation_matrix
 from hybrid.simulation.simulate import simulate
@@ -51,6 +52,7 @@ __all__ = [
     "DOP853",
     "After",
     "Answer",
+    "ArcEnd",
     "ArgumentError",
     "At",
     "Attractor",
@@ -93,6 +95,7 @@ __all__ = [
     "from_equations",
     "global_error",
     "open_branch",
+    "open_end",
     "open_store",
     "periodic_orbit",
     "poincare_section",

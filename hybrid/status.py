@@ -156,8 +156,8 @@ def run_status(
         ),
         StatusCode.INTERRUPTED: (
             f"Interrupted {where}.",
-            "The result holds everything up to that time. Continue from its last time, state and mode, or "
-            "call again.",
+            "The result holds everything up to that time. An arc goes on from its end, "
+            "simulate(system, arc.end, (arc.end.t, t1)); or call again.",
         ),
         StatusCode.OUT_OF_MEMORY: (
             f"The steps and jumps that the run keeps fill a third of this machine's memory {where}.",

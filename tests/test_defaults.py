@@ -58,6 +58,7 @@ DEFAULTS = {
     hybrid.continue_orbit: {"solver": None, "max_steps": 2000, "progress": None},
     hybrid.continue_bifurcation: {"solver": None, "max_steps": 500, "progress": None},
     hybrid.open_branch: {},
+    hybrid.open_end: {},
     hybrid.filippov: {"start": None, **SYSTEM},
     hybrid.from_equations: PLAIN,
     hybrid.Laws: {

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from hybrid import arguments
 from hybrid.display.tables import counted, html_table
 from hybrid.errors import ArgumentError
+from hybrid.simulation.end import ArcEnd, end_without_component
 from hybrid.simulation.jumps import Grazing, Jumps, Sensitivities, known
 from hybrid.simulation.labelled import Names, attributes, with_counters, with_outputs
 from hybrid.simulation.points import Pieces, Samples, Steps
@@ -35,6 +36,7 @@ MADE_LATER = {
     "_jumps": attrgetter("jumps"),
     "status": attrgetter("course.status"),
     "_pieces": attrgetter("pieces"),
+    "end": attrgetter("course.go_on"),
 }
 
 
@@ -66,6 +68,8 @@ class HybridArc:
         every mode is exact, a crossing can only be missed if rounding hides it.
     steps, rejected
         Number of attempted steps, and how many of them the error control rejected.
+    end
+        Where the run ended, for a run that goes on from there: :class:`ArcEnd`.
 
     Examples
     --------
@@ -94,6 +98,7 @@ class HybridArc:
     steps: int
     rejected: int
     _pieces: Pieces | None
+    end: ArcEnd
     _sensitivities: Sensitivities | None = None
 
     @classmethod
@@ -352,4 +357,5 @@ def without_component(arc: HybridArc, i: int, system: HybridSystem) -> HybridArc
         grazings=tuple(attrs.evolve(each, x=np.delete(each.x, i)) for each in arc.grazings),
         fundamental=None if fundamental is None else np.delete(fundamental, i, axis=0),
         pieces=pieces,
+        end=end_without_component(arc.end, i),
     )

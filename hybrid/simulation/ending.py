@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import attrs
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from hybrid.display.tables import counted
 from hybrid.kernels.types import codes
 from hybrid.kernels.types.notes import MOST_LATENESS, carries_plainly, is_plain
+from hybrid.simulation.end import ArcEnd, end_of
 from hybrid.simulation.trajectory import Trajectory
 from hybrid.status import (
     SUCCESS,
@@ -56,18 +57,17 @@ def status_of(trajectory: Trajectory, code: int) -> Status:
 
 
 class Ending:
-    """How a run ended: its status, which is made when somebody asks for it.
+    """How a run ended: its status, and what the next run may go on from; both are made when somebody asks.
 
-    Until then it holds a copy of what the run has counted, since the memory goes to the next run. The status
+    Until then it holds a copy of what the run has been, since the memory goes to the next run. The status
     of a run that did not reach its end is made at once: it may look further than at the run.
     """
 
     def __init__(self, trajectory: Trajectory, code: int) -> None:
         self._status: Status | None = None
-        self._held: tuple[Trajectory, np.ndarray] | None = None
-        if code == codes.DONE and trajectory.system.growth is None:
-            self._held = trajectory, trajectory.words()
-        else:
+        self._memory: ArcEnd | None = None
+        self._held: tuple[Trajectory, np.ndarray] | None = trajectory, trajectory.words()
+        if code != codes.DONE or trajectory.system.growth is not None:
             self._status = status_of(trajectory, code)
 
     @property
@@ -75,14 +75,33 @@ class Ending:
         """The status."""
         # Another thread may ask too: the status is there before what it is made of goes.
         held = self._held
-        if held is not None:
+        if self._status is None:
+            assert held is not None
             trajectory, words = held
             before = trajectory.as_it_was(words)
             self._status = status_of(before, codes.DONE)
             before.release()
-            self._held = None
-        assert self._status is not None
+            if trajectory.tangents:
+                # The tangent vectors may be large, and no run goes on with them.
+                self._remember()
         return self._status
+
+    def end(self, t: float, parameters: Mapping[str, float]) -> ArcEnd:
+        """The end, with the time and the parameters as they are told of the run."""
+        self._remember()
+        assert self._memory is not None
+        return attrs.evolve(self._memory, t=t, parameters=parameters)
+
+    def _remember(self) -> None:
+        """Make what the next run may go on from, and let go of the copy that it is made of."""
+        held, status = self._held, self.status
+        if self._memory is None and held is not None:
+            trajectory, words = held
+            before = trajectory.as_it_was(words)
+            told = before.t, before.named_parameters, status.code
+            self._memory = end_of(before.system, before.run, *told, before.plan.by_steps)
+            before.release()
+        self._held = None
 
 
 def has_tangents(trajectory: Trajectory) -> bool:
@@ -422,7 +441,7 @@ def _grazed(trajectory: Trajectory, grazed: int) -> Status:
 
 def _recent(trajectory: Trajectory, number: int) -> list[int]:
     """The last transitions that fired, in order, as far as the run remembers them."""
-    jumps, recent = trajectory.jumps, trajectory.run.recent
+    jumps, recent = int(trajectory.run.jumps), trajectory.run.recent
     number = min(number, jumps, len(recent))
     return [int(recent[j % len(recent)]) for j in range(jumps - number, jumps)]
 

@@ -45,7 +45,8 @@ class Plan:
     ``advance`` is the driver. ``parts_so_far`` are ``parts`` without those that few runs call and that are
     not compiled yet. ``task`` keeps no record and lacks only what a run has for itself. ``model`` is that at
     the default parameters, see ``CompiledSystem.moved_by``. ``propagators`` says how each mode is advanced,
-    by the name of the mode; ``degree`` is that of the steps in a record.
+    by the name of the mode; ``degree`` is that of the steps in a record. ``by_steps`` is the mode that is
+    advanced by steps of the solver, although it has a series.
     """
 
     method: Any
@@ -58,6 +59,7 @@ class Plan:
     run_layout: Any
     work_layout: Any
     ticks: Callable[[np.ndarray, np.ndarray], list[float]] | None = None
+    by_steps: int | None = None
     spares: list[Memory] = attrs.field(factory=list, init=False)
     # What crews of the plan have in common, once it is known (``crew``).
     together: list[Any] = attrs.field(factory=list, init=False)
@@ -143,6 +145,7 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: i
             run_layout(n, tangents, modes, transitions, system.first_tick[-1]),
             work_layout(method, n, tangents, guards, columns, rows),
             partial(ticks_of, system) if system.first_tick[-1] else None,
+            by_steps,
         )
         while len(compiled.plans) >= MOST_LAYOUTS:
             compiled.plans.pop(next(iter(compiled.plans)), None)

@@ -10,6 +10,7 @@ import attrs
 import numpy as np
 
 from hybrid.compiler.cache.loader import load_kernels
+from hybrid.simulation.end import ArcEnd
 from hybrid.simulation.ending import Ending
 from hybrid.simulation.jumps import Jumps
 from hybrid.simulation.periods import time_at
@@ -36,8 +37,8 @@ class JumpRows(NamedTuple):
     saltation: np.ndarray
 
 
-class End(NamedTuple):
-    """Where a run ended: time, state ``(n,)``, mode and number of jumps."""
+class Last(NamedTuple):
+    """The last point of a run: time, state ``(n,)``, mode and number of jumps."""
 
     t: float
     x: np.ndarray
@@ -52,7 +53,7 @@ class Course:
     system: HybridSystem
     values: np.ndarray
     period: float
-    end: End
+    end: Last
     ending: Ending
 
     @property
@@ -64,6 +65,11 @@ class Course:
     def status(self) -> Status:
         """How the run ended."""
         return self.ending.status
+
+    @property
+    def go_on(self) -> ArcEnd:
+        """Where the run ended, with its memory."""
+        return self.ending.end(self.end.t, self.parameters)
 
     def jumps(self, rows: JumpRows) -> Jumps:
         """The jumps that a run wrote down."""

@@ -14,9 +14,9 @@ from hybrid.simulation.jumps import Grazing
 from hybrid.simulation.memory import memory_for_records, record_layout
 from hybrid.simulation.points import (
     Course,
-    End,
     Filled,
     JumpRows,
+    Last,
     Pieces,
     Samples,
     StepRows,
@@ -44,6 +44,7 @@ class Recorder:
         self, trajectory: Trajectory, times: np.ndarray | None, t1: float, keeps_jumps: bool
     ) -> None:
         self.trajectory, self.times, self.keeps_jumps = trajectory, times, keeps_jumps
+        self.before = trajectory.first_jump
         # The state at the end is at hand without any polynomial.
         only_the_end = times is not None and not (times.size and times.item(0) < t1)
         self.steps_at_once = 0 if only_the_end else STEPS_AT_ONCE
@@ -65,12 +66,14 @@ class Recorder:
     def run(self, t1: float, max_jumps: int) -> HybridArc:
         """Run to ``t1`` or until something else ends the run."""
         trajectory = self.trajectory
+        # Kernels count the jumps of the runs before, too.
+        max_jumps += self.before
         code = self._advance(t1, max_jumps)
         if code == codes.RECORD_FULL:
             code = self._go_on(t1, max_jumps)
         run = trajectory.run
-        jumps = run.jumps
-        end = End(t1 if code == codes.DONE else trajectory.t, trajectory.x, run.mode, jumps)
+        jumps = run.jumps - self.before
+        end = Last(t1 if code == codes.DONE else trajectory.t, trajectory.x, run.mode, jumps)
         ending = Ending(trajectory, code)
         course = Course(trajectory.system, trajectory.parameters, trajectory.model.period, end, ending)
         rows = None
@@ -111,6 +114,9 @@ class Recorder:
         record.used.fill(0)
         code = self.trajectory.advance(t1, record, max_jumps)
         steps, jumps, grazings, matrices = record.used.tolist()
+        if self.before:
+            record.step_jumps[:steps] -= self.before
+            record.grazing_jumps[:grazings] -= self.before
         if jumps and self.keeps_jumps:
             self.jumps.append(self._copied_jumps(record, jumps, matrices))
         if grazings:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from hybrid import arguments
 from hybrid.errors import ArgumentError
 from hybrid.simulation.arc import HybridArc, without_component
+from hybrid.simulation.end import ArcEnd
 from hybrid.simulation.periods import check_time
 from hybrid.simulation.recorder import Recorder
 from hybrid.simulation.sensitivity import with_sensitivities
@@ -23,7 +24,7 @@ from hybrid.system.growth import growing
 @growing
 def simulate(
     system: HybridSystem,
-    x0: ArrayLike,
+    x0: ArrayLike | ArcEnd,
     t_span: tuple[float, float],
     *,
     mode: str | None = None,
@@ -44,7 +45,8 @@ def simulate(
     x0
         State ``(n,)`` at the start, in order or by name: ``{"q": 1.0, "v": 0.0}``. A Series of pandas or a
         DataArray of xarray that is labelled with the names is read by these, in any order. Held components
-        and counters come last and may be left out: they are 0 then.
+        and counters come last and may be left out: they are 0 then. The end of a run, ``arc.end``, goes on
+        from there with the mode, the parameters, the clocks and the memory of that run.
     t_span
         ``(t0, t1)`` with ``t0 <= t1``. Events at ``t1`` belong to the run.
     mode
@@ -101,6 +103,11 @@ def simulate(
             "keep_jumps=False needs samples=: the points of an arc are made of its jumps too."
         )
     names = _parameter_names(system, sensitivities)
+    if names and isinstance(x0, ArcEnd) and system.aging:
+        raise ArgumentError(
+            "sensitivities= needs a start at which the mode is entered, because an After counts from there; "
+            "x0 is the end of a run. Give x0=end.x and mode=end.mode."
+        )
     trajectory = start(
         system,
         x0,

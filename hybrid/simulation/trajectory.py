@@ -14,6 +14,15 @@ from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.compiler.interrupts import CTRL_C, Stop, raise_if_dropped
 from hybrid.kernels.types import codes
 from hybrid.kernels.types.codes import UNLIMITED
+from hybrid.simulation.end import (
+    ArcEnd,
+    age_of,
+    check_tangents,
+    goes_on_in,
+    mode_by_steps,
+    put_memory,
+    with_component,
+)
 from hybrid.simulation.initial_mode import choose_mode
 from hybrid.simulation.interrupt import FIRST_BURST, Bursts
 from hybrid.simulation.memory import Memory, put_tangents
@@ -51,14 +60,28 @@ def start(
     ``stop`` who may end the run early.
     """
     as_system("system", system)
+    end = x0 if isinstance(x0, ArcEnd) else None
+    if end is not None:
+        mode, parameters = goes_on_in(system, end, t0, mode, parameters, time)
+        x0 = end.x
     state = system.variables.state_values("x0", x0)
     t0 = arguments.number(time, t0)
     mode = mode if by_guards else starting_mode(system, mode)
     if system.growth is not None:
         explore(system, t0, state, system.parameter_values(parameters), mode)
-    system, state, tangent = directed(system, state, tangent)
-    common = Common(compile_system(system), check_solver(solver), tangent, t0, time, horizon, stop)
-    return common.begin(state, mode, lambda plan, memory: common.compiled.given(parameters, plan.model))
+    whole, state, tangent = directed(system, state, tangent)
+    common = Common(compile_system(whole), check_solver(solver), tangent, t0, time, horizon, stop)
+
+    def model_of(plan: Plan, memory: Memory) -> Any:
+        return common.compiled.given(parameters, plan.model)
+
+    if end is None:
+        return common.begin(state, mode, model_of)
+    if whole is not system:
+        age = whole.age
+        assert age is not None, "tangent vectors are carried in the aged system"
+        end = with_component(end, age, whole.state_names[age], age_of(end, system))
+    return common.go_on(end, model_of)
 
 
 def directed(
@@ -131,12 +154,27 @@ class Common:
         most = self.solver.max_steps
         return Trajectory(compiled, plan, model, memory, tangents, most, phase0, beyond, self.stop)
 
+    def go_on(self, end: ArcEnd, model_of: Callable[[Plan, Memory], Any]) -> Trajectory:
+        """A trajectory that goes on from the end of a run."""
+        raise_if_dropped()
+        compiled, tangents = self.compiled, 0 if self.tangent is None else self.tangent.shape[1]
+        if tangents:
+            check_tangents(end)
+        plan = plan_of(compiled, self.solver, tangents, by_steps=mode_by_steps(end, compiled.system))
+        memory = plan.memory()
+        model = model_of(plan, memory)
+        phase0 = memory.begin(model, end.x, self.tangent, self.t0, self.horizon)
+        put_memory(end, memory.run, compiled.system)
+        most, jumps = self.solver.max_steps, int(memory.run.jumps)
+        return Trajectory(compiled, plan, model, memory, tangents, most, phase0, (), self.stop, jumps)
+
 
 @attrs.frozen(eq=False)
 class Trajectory:
     """A run that can be advanced. Kernels change what is in its ``memory``; all else is fixed.
 
-    ``beyond`` names the transitions whose guards the start lies beyond.
+    ``beyond`` names the transitions whose guards the start lies beyond, ``first_jump`` is how many jumps the
+    runs have made that this one goes on from.
     """
 
     compiled: CompiledSystem
@@ -148,6 +186,7 @@ class Trajectory:
     phase0: float
     beyond: tuple[str, ...] = ()
     stop: Stop = CTRL_C
+    first_jump: int = 0
 
     @property
     def parameters(self) -> np.ndarray:
@@ -199,7 +238,7 @@ class Trajectory:
     @property
     def jumps(self) -> int:
         """Jumps so far."""
-        return int(self.run.jumps)
+        return int(self.run.jumps) - self.first_jump
 
     @property
     def steps(self) -> int:
@@ -322,7 +361,7 @@ class Trajectory:
         """A trajectory in another memory, whose run is what ``words`` gave once."""
         memory = self.plan.memory()
         self.plan.run_layout.words(memory.run)[:] = words
-        others = self.tangents, self.max_steps, self.phase0, self.beyond, self.stop
+        others = self.tangents, self.max_steps, self.phase0, self.beyond, self.stop, self.first_jump
         return Trajectory(self.compiled, self.plan, self.model, memory, *others)
 
     def release(self) -> None:

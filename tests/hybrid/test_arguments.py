@@ -91,6 +91,7 @@ NOT_CALLED = {
     "CompiledSystem",
     "Grazing",
     "HybridArc",
+    "ArcEnd",
     "Jump",
     "GlobalError",
     "PeriodicOrbit",

@@ -76,6 +76,10 @@ def methods(made):
             call(hybrid.open_branch, made["branch"].system, made["branch"].to_xarray()),
             {"system": [None, 3, "a"], "saved": [None, 3, "no such folder", made["flip"]]},
         ),
+        (
+            call(hybrid.open_end, arc.end.to_xarray()),
+            {"saved": [None, 3, "no such file", made["flip"], made["branch"].to_xarray()]},
+        ),
         (call(hybrid.Solver.tightened, hybrid.DOP853(), 10.0), {"factor": POSITIVE}),
         (call(HybridSystem.mode_index, BALL, "flight"), {"name": [None, *NAME]}),
         (call(HybridSystem.parts_of, BALL, "flight"), {"name": [None, *NAME]}),

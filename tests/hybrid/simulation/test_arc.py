@@ -256,7 +256,7 @@ def test_components_and_jumps_by_name():
     arc = hybrid.simulate(system, system.dimension * (0.1,), (0.0, 20.0))
     for i, name in enumerate(system.state_names):
         np.testing.assert_array_equal(arc[name], arc.x[:, i])
-    with pytest.raises(hybrid.ArgumentError, match="State component 'w' does not exist"):
+    with pytest.raises(hybrid.ArgumentError, match="State component or output 'w' does not exist"):
         arc["w"]
     first, second = system.transition_names[:2]
     assert {first, second} == set(arc.jumps.transition)
