@@ -60,7 +60,8 @@ DEFAULTS = {
     hybrid.open_branch: {},
     hybrid.open_end: {},
     hybrid.filippov: {"start": None, **SYSTEM},
-    hybrid.from_equations: PLAIN,
+    hybrid.from_equations: {**PLAIN, "modes": None},
+    hybrid.split: {"modes": None},
     hybrid.Laws: {
         **dict.fromkeys(
             ("invariant", "equal", "conserved", "dissipated", "balance", "continuous", "across"), ()

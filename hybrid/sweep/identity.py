@@ -197,7 +197,9 @@ def _described(value: Any, seen: set[int]) -> str:
     if isinstance(value, HybridSystem):
         if value.growth is not None:
             # The modes made so far decide nothing.
-            return f"split {_described(value.growth.original, seen)}"
+            names = getattr(value.growth, "called", None)
+            told = f" {_described(names, seen)}" if names else ""
+            return f"split {_described(value.growth.original, seen)}{told}"
         return f"{value.name or 'unnamed'} {_hash(_described_fields(value, seen))}"
     if isinstance(value, CodeType):
         return _described_code(value)

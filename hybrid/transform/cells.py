@@ -28,6 +28,7 @@ from hybrid.transform.naming import Names
 from hybrid.transform.rounding import combined
 from hybrid.transform.surface import SwitchingSurface
 from hybrid.transform.ties import Sides, Ties
+from hybrid.transform.titles import Titles
 
 # Two solutions for the shares on an intersection count as one if their relative difference is less than the
 # square root of this number.
@@ -247,7 +248,7 @@ class Pieces:
         """
         result = self.switches.resolved(sides)
         if isinstance(result, int):
-            names, known = Names(self.variables), self.surfaces.known
+            names, known = Names(self.variables, Titles((), self.surfaces)), self.surfaces.known
             meeting = [names.side(known, number, 0) for number, side in sides.items() if side in (-2, 0, 2)]
             raise ModelError(
                 f"split: the surface {names.side(known, result, 0)} passes through the intersection of "

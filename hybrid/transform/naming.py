@@ -13,6 +13,7 @@ from hybrid.expression.surfaces import QUARTER, Surface
 from hybrid.expression.text import text
 from hybrid.expression.tracing import Symbols, model_symbols
 from hybrid.system.variables import Variables
+from hybrid.transform.titles import Titles
 
 # A name of more characters than this is replaced by a letter and a number.
 LONGEST = 20
@@ -24,9 +25,10 @@ SIGNS = {-1: "<", 0: "=", 1: ">"}
 
 
 class Names:
-    """Names of sides in the words of a model."""
+    """Names of sides in the words of a model, and those that its author gives."""
 
-    def __init__(self, variables: Variables) -> None:
+    def __init__(self, variables: Variables, titles: Titles) -> None:
+        self.titles = titles
         names = variables.parameter_names
         self.symbols: Symbols = model_symbols(variables.dimension, len(names))
         pairs = [*zip(self.symbols.x, variables.state_names, strict=True)]
@@ -66,8 +68,10 @@ class Names:
         )
 
     def cell(self, surfaces: Sequence[Surface], sides: Sequence[tuple[int, int]]) -> str:
-        """Name of a cell by its sides; empty if there are none."""
-        return ", ".join(self.side(surfaces, number, side) for number, side in sides)
+        """Name of a cell by what its author calls it, and its other sides; empty if there are none."""
+        given, told = self.titles.of(sides, lambda number, side: self.side(surfaces, number, side))
+        left = [self.side(surfaces, number, side) for number, side in sides if number not in told]
+        return ", ".join([*given, *left])
 
     def _without_levels(self, height: Expression) -> Expression:
         """The height with each floor written as a remainder if that is shorter, else as ``floor``."""

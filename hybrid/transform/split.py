@@ -22,6 +22,7 @@ def from_equations(
     angles: Mapping[str, float] | None = None,
     outputs: Mapping[str, Any] | None = None,
     laws: Laws | None = None,
+    modes: Mapping[str, Any] | None = None,
 ) -> HybridSystem:
     """The hybrid system of one right-hand side with ``np.sign``, ``np.abs``, ``np.where`` and the like.
 
@@ -33,6 +34,8 @@ def from_equations(
         ``f(t, x, p)``, which returns the ``n`` derivatives. It must be traceable.
     state, parameters, period, name, units, angles, outputs, laws
         As for `HybridSystem`.
+    modes
+        Names for the modes, as for `split`.
 
     Raises
     ------
@@ -65,11 +68,12 @@ def from_equations(
             angles={} if angles is None else angles,
             outputs={} if outputs is None else outputs,
             laws=Laws() if laws is None else laws,
-        )
+        ),
+        modes=modes,
     )
 
 
-def split(system: HybridSystem) -> HybridSystem:
+def split(system: HybridSystem, *, modes: Mapping[str, Any] | None = None) -> HybridSystem:
     """The system in which every kink and every jump inside a model function has become modes and guards.
 
     Switching functions are found in fields, guards and resets: ``sign``, ``abs``, ``maximum``, ``minimum``,
@@ -88,6 +92,10 @@ def split(system: HybridSystem) -> HybridSystem:
     ----------
     system
         Its functions must be traceable where they have kinks or jumps.
+    modes
+        Names for the modes: ``{"in the gap": lambda t, x, p: (x.q > -1) & (x.q < 1)}``. Where the condition
+        holds the name takes the place of the sides that the condition compares. It is a comparison of what
+        the equations switch on, or several; or sides as they stand in the names of modes, ``"q>-1, q<1"``.
 
     Returns
     -------
@@ -102,7 +110,7 @@ def split(system: HybridSystem) -> HybridSystem:
     ModelError
         If a field cannot be traced, or a reset into a mode that is split cannot. If a branch is written with
         Python's ``if``, the message shows the ``np.where`` to write. If a `Table` jumps in the state; other
-        tables are left as they are.
+        tables are left as they are. If a name in ``modes`` is that of no mode.
 
     Notes
     -----
@@ -154,4 +162,4 @@ def split(system: HybridSystem) -> HybridSystem:
     # SymPy is slow to import, so it is not imported with the library.
     from hybrid.transform.splitter import Splitter
 
-    return Splitter(system).begin()
+    return Splitter(system, modes).begin()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
 from itertools import chain, count, islice, product
 from threading import RLock
@@ -31,6 +31,7 @@ from hybrid.transform.cells import Cell, Choice, Pieces
 from hybrid.transform.edges import Edge, Outgoing
 from hybrid.transform.naming import Names, copy_name
 from hybrid.transform.ticks import timed
+from hybrid.transform.titles import titles_of
 
 # Parts may differ from the field by so much of its largest value: other orders of the same sums.
 AGREEMENT = 1e-9
@@ -43,8 +44,8 @@ MOST_WHOLE = 12
 class Splitter:
     """Makes the modes and transitions of the split system, cell by cell."""
 
-    def __init__(self, system: HybridSystem) -> None:
-        self.original = system
+    def __init__(self, system: HybridSystem, modes: Mapping[str, Any] | None = None) -> None:
+        self.original, self.called = system, modes
         self.watched = watched_by(system)
         self.lock = RLock()
         self.written: dict[Any, Any] = {}
@@ -52,7 +53,7 @@ class Splitter:
         self.variables = system.variables
         self.symbols = model_symbols(system.dimension, len(system.parameters))
         self.surfaces = Surfaces(self.symbols)
-        self.names = Names(self.variables)
+        self.names = Names(self.variables, titles_of(modes, self.variables, self.surfaces))
         self.outgoing = [Outgoing.of(i, each, self.variables) for i, each in enumerate(system.transitions)]
         self.pieces = [self._pieces(i, mode) for i, mode in enumerate(system.modes)]
         self.known: dict[Cell, tuple[Mode, list[Edge]]] = {}
@@ -61,7 +62,7 @@ class Splitter:
         self.frontier: dict[str, Cell] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _begun, (self.original,)
+        return _begun, (self.original, self.called)
 
     def begin(self) -> HybridSystem:
         """The whole system if it is small; else its first stage."""
@@ -71,7 +72,17 @@ class Splitter:
         if len(self.made) > MOST_WHOLE:
             # A run makes the modes around its start.
             self.made = dict.fromkeys(first[:1])
+            return self.current
+        self.names.titles.check({*self._titles()}, self.current.mode_names)
         return self.current
+
+    def _titles(self) -> Iterator[str]:
+        """The names that the author gave and that cells have, each as often as it is used."""
+        known = self.surfaces.known
+        for cell in self.made:
+            yield from self.names.titles.of(
+                cell.sides, lambda number, side: self.names.side(known, number, side)
+            )[0]
 
     @property
     def current(self) -> HybridSystem:
@@ -470,9 +481,9 @@ class Splitter:
         return self._landings(cell, transition.accumulates_to, [*self.symbols.x])[0].cell
 
 
-def _begun(system: HybridSystem) -> Splitter:
+def _begun(system: HybridSystem, modes: Mapping[str, Any] | None) -> Splitter:
     """The splitter of a system that has been pickled."""
-    splitter = Splitter(system)
+    splitter = Splitter(system, modes)
     splitter.begin()
     return splitter
 

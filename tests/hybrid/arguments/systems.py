@@ -32,10 +32,17 @@ BAD_STATES = [
 MEMORY = [None, "u", 1, True, ("1u",), ("u", "u"), (1,), {"u"}, [["u"]], Odd()]
 
 
+# Names that an author gives to modes; the first system that takes them has one switch, that of abs(q).
+CALLED = [
+    *LIST[2:4], True, Odd(), {"a": 3}, {"a": None}, {3: "q<0"}, {"": "q<0"}, {"a": lambda t, x, p: x.q},
+    {"a": lambda t, x, p: x.q < 0.5}, {"a": lambda t, x, p: x.nope < 0}, {"a": "q<1"}, {"a": ""},
+]  # fmt: skip
+
+
 def systems():
     return [
         (call(hybrid.compile_system, BALL), {"system": SYSTEM}),
-        (call(hybrid.split, BALL), {"system": SYSTEM}),
+        (call(hybrid.split, BALL), {"system": SYSTEM, "modes": CALLED}),
         (
             call(hybrid.Table, [0.0, 1.0], [2.0, 3.0]),
             {
@@ -55,6 +62,7 @@ def systems():
                 "name": TEXT,
                 "units": UNITS,
                 "angles": ANGLES,
+                "modes": CALLED,
                 "outputs": OUTPUTS,
                 "laws": [*FUNCTION, {}, Odd()],
             },
