@@ -16,7 +16,7 @@ from hybrid.errors import ModelError
 from hybrid.expression.evaluation import Program, expressed, scalar
 from hybrid.expression.graph import replaced
 from hybrid.expression.nodes import ZERO, Expression, Number, Symbol
-from hybrid.expression.operations import And, Less, LessEqual, Not, Or
+from hybrid.expression.operations import And, Less, Not, Or
 from hybrid.expression.surfaces import Surfaces
 from hybrid.expression.switches import Resolved, Switches
 from hybrid.expression.tabulated import in_branches
@@ -29,6 +29,7 @@ from hybrid.system.graph import HybridSystem, watched_by
 from hybrid.transform import corners, rests
 from hybrid.transform.cells import Cell, Choice, Pieces
 from hybrid.transform.edges import Edge, Outgoing
+from hybrid.transform.landings import landed, on_side
 from hybrid.transform.naming import Names, copy_name
 from hybrid.transform.ticks import timed
 from hybrid.transform.titles import titles_of
@@ -361,17 +362,9 @@ class Splitter:
         [condition] = trace(function, self.variables.components, self.variables.parameter_names)
         return condition
 
-    def _on(
-        self, chosen: Sequence[tuple[int, int]], after: Sequence[Expression] | None = None
-    ) -> list[Expression]:
-        """Conditions that the state lies on these sides; with ``after``, the state after a reset."""
-        conditions: list[Expression] = []
-        for number, side in chosen:
-            height = self._asked(number)
-            if after is not None:
-                height = self._after_reset(height, after)
-            conditions.append(LessEqual(ZERO, height) if side > 0 else Less(height, ZERO))
-        return conditions
+    def _on(self, chosen: Sequence[tuple[int, int]]) -> list[Expression]:
+        """Conditions that the state lies on these sides."""
+        return [on_side(self._asked(number), side) for number, side in chosen]
 
     def _asked(self, number: int) -> Expression:
         """What has the sign of a height; of one of time alone also at the instants at which its sides end."""
@@ -395,23 +388,23 @@ class Splitter:
         limit = self._limit(cell, transition)
         new["accumulates_to"] = None if limit is None else self.name_of(limit)
         landings = [
-            (chosen, after, landing)
+            (chosen, after, target, conditions)
             for chosen, after in self._after(cell, outgoing)
-            for landing in self._landings(cell, transition.target, after)
+            for target, conditions in self._landed(cell, transition.target, after)
         ]
-        for chosen, after, landing in landings:
-            more = [*self._on(chosen), *self._on(landing.chosen, after)]
+        for chosen, after, target, conditions in landings:
+            more = [*self._on(chosen), *conditions]
             when = _all([*asked, *more]) if more else guard.when
-            to = self.names.cell(self.surfaces.known, landing.cell.sides)
+            to = self.names.cell(self.surfaces.known, target.sides)
             copy = attrs.evolve(
                 transition,
-                target=self.name_of(landing.cell),
+                target=self.name_of(target),
                 guard=attrs.evolve(cast(Any, guard), when=when),
                 reset=transition.reset if after == outgoing.reset else Reset(expressed(after or ())),
                 name=copy_name(transition.name, own, to if len(landings) > 1 else ""),
                 **new,
             )
-            yield Edge(copy, landing.cell, limit)
+            yield Edge(copy, target, limit)
 
     def _truth(self, condition: Function) -> Expression:
         """A user's condition, positive or true, as a truth value."""
@@ -445,6 +438,14 @@ class Splitter:
                 waiting += [{**chosen, result: +1}, {**chosen, result: -1}]
             else:
                 yield tuple(chosen.items()), outgoing.reset if not result.used else [*result.entries]
+
+    def _landed(
+        self, cell: Cell, target: str, after: list[Expression] | None
+    ) -> Iterator[tuple[Cell, list[Expression]]]:
+        """The cells of the target mode that a jump may lead to, with its conditions."""
+        choices = self._landings(cell, target, after)
+        pieces = self.pieces[self.original.mode_index(target)]
+        return landed(pieces, choices, self._asked, lambda each: self._after_reset(each, after or ()))
 
     def _landings(self, cell: Cell, target: str, after: list[Expression] | None) -> list[Choice]:
         """The cells of the target mode that the state after a reset may lie in."""

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from collections.abc import Mapping
 
 import attrs
 import numpy as np
@@ -36,7 +37,7 @@ def same(one, other):
         return isinstance(other, np.ndarray) and np.array_equal(one, other, equal_nan=one.dtype.kind in "fc")
     if isinstance(one, tuple | list) or (isinstance(one, np.ndarray) and one.dtype == object):
         return len(one) == len(other) and all(map(same, one, other))
-    if isinstance(one, dict):
+    if isinstance(one, Mapping):
         return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
     if isinstance(one, HybridSystem):
         return described(one) == described(other)
@@ -65,6 +66,7 @@ def results():
     arc = hybrid.simulate(BALL, START, (0.0, 2.0))
     return {
         "arc": arc,
+        "end": arc.end,
         "samples": hybrid.simulate(BALL, START, (0.0, 2.0), samples=[0.5, 1.5], tangent=True),
         "jump": arc.jumps[1],
         "jumps": arc.jumps,
