@@ -271,7 +271,8 @@ class TestOutputs:
         assert figures.arc.portrait.yaxis[0].axis_label == "stored"
         assert figures.arc.series_axes.wanted[1] == pytest.approx((-1.0, 1.0), abs=1e-3)
         assert np.isfinite(self.column(page, figures.arc.start, "stored")).all()
-        assert np.isfinite(np.asarray(figures.arc.jumps.data["b2"])).all()
+        after = f"b{figures.states.names.index('stored')}"
+        assert np.isfinite(np.asarray(figures.arc.jumps.data[after])).all()
 
     def test_in_the_diagram_and_on_the_branch(self, page):
         page.widgets.switches["orbit"].value = True
