@@ -9,7 +9,14 @@ from matplotlib.axes import Axes
 
 from hybrid import simulate
 from hybrid.plot import COLOURS
-from models import battery_cell, boost_converter, dosing_schedule, refractory_neuron, sampled_loop
+from models import (
+    battery_cell,
+    boost_converter,
+    dosing_schedule,
+    infusion_schedule,
+    refractory_neuron,
+    sampled_loop,
+)
 from models.battery_cell import CYCLE
 
 
@@ -45,6 +52,15 @@ def doses(axes: Axes) -> None:
         arc = simulate(dosing_schedule(map(float, times)), (0.0, 0.0), (0.0, 96.0), samples=t)
         axes.plot(t, arc["c"], color=COLOURS[len(axes.lines)], label=label)
     axes.set(xlabel="t (h)", ylabel="c (mg/L)")
+    axes.legend(frameon=False)
+
+
+def infusions(axes: Axes) -> None:
+    t = np.linspace(-1.0, 36.0, 741)
+    arc = simulate(infusion_schedule(), {"c": 0.0}, (-1.0, 36.0), samples=t)
+    axes.fill_between(t, arc["r"] / 10.0, step="post", color=COLOURS[1], alpha=0.3, label="rate (10 mg/h)")
+    axes.plot(t, arc["c"], color=COLOURS[0], label="c (mg/L)")
+    axes.set(xlabel="t (h)", xlim=(-1.0, 36.0), ylim=(0.0, None))
     axes.legend(frameon=False)
 
 
@@ -92,6 +108,11 @@ PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
         "dosing_schedule",
         "Concentration under doses at listed times, and with the third one missed.",
         doses,
+    ),
+    (
+        "infusion_schedule",
+        "Concentration under three infusions from a table, which overlap, and the sum of their rates.",
+        infusions,
     ),
     (
         "refractory_neuron",

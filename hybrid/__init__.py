@@ -39,10 +39,11 @@ from hybrid.sweep.attractors.fractions import basin_fractions
 from hybrid.sweep.many import simulate_many
 from hybrid.sweep.store import open_store
 from hybrid.sweep.sweep import sweep
-from hybrid.system.clocks import After, At, Every
+from hybrid.system.clocks import After, Every
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.system.laws import Laws
+from hybrid.system.schedule import At
 from hybrid.transform.filippov import filippov
 from hybrid.transform.split import from_equations, split
 

@@ -13,6 +13,7 @@ from models.dosing_schedule import dosing_schedule
 from models.dry_friction_oscillator import dry_friction_oscillator
 from models.impact_oscillator import impact_oscillator
 from models.impact_pair import impact_pair
+from models.infusion_schedule import infusion_schedule
 from models.refractory_neuron import refractory_neuron
 from models.rimless_wheel import rimless_wheel
 from models.rocking_block import rocking_block
@@ -40,6 +41,7 @@ __all__ = [
     "dry_friction_oscillator",
     "impact_oscillator",
     "impact_pair",
+    "infusion_schedule",
     "refractory_neuron",
     "rimless_wheel",
     "rocking_block",

@@ -18,7 +18,7 @@ def dosing_schedule(times: Iterable[float] = (8.0, 20.0, 32.0, 44.0, 56.0, 68.0)
     Parameters
     ----------
     times
-        Times of the doses in hours, increasing. A run that starts at one of them has had this dose.
+        Times of the doses in hours. A run that starts at one of them has had this dose.
 
     Returns
     -------

@@ -107,30 +107,47 @@ class CompiledSystem:
         return "guard bounded on each step, its crossings are proved"
 
     def value(
-        self, function: ModelFunction, index: int, t: float, x: np.ndarray, parameters: np.ndarray
+        self,
+        function: ModelFunction,
+        index: int,
+        t: float,
+        x: np.ndarray,
+        parameters: np.ndarray,
+        row: int = 0,
     ) -> np.ndarray:
-        """A compiled function of the mode or transition of that index, ``(rows,)``; nan if it fails."""
+        """A compiled function of the mode or transition of that index, ``(rows,)``; nan if it fails.
+
+        ``row`` is that of a schedule that fires.
+        """
         out = np.full(function.rows, np.nan)
         offset = len(self.system.transitions) if function.kind == CONDITION else 0
-        self._call("vector_function", FUNCTION_NUMBERS[function.kind], index + offset, t, x, parameters, out)
+        values = self.with_tables(np.array(parameters, dtype=float), row)
+        self._call("vector_function", FUNCTION_NUMBERS[function.kind], index + offset, t, x, values, out)
         return out
 
     def derivative(
-        self, function: ModelFunction, index: int, t: float, x: np.ndarray, parameters: np.ndarray
+        self,
+        function: ModelFunction,
+        index: int,
+        t: float,
+        x: np.ndarray,
+        parameters: np.ndarray,
+        row: int = 0,
     ) -> np.ndarray:
         """The derivative ``(rows, n + 1)`` of a function; the last column is the derivative in time."""
         out = np.full((function.rows, self.system.dimension + 1), np.nan)
+        values = self.with_tables(np.array(parameters, dtype=float), row)
         if function.size is None:
-            self._call("vector_function", GRADIENT, index, t, x, parameters, out[0])
+            self._call("vector_function", GRADIENT, index, t, x, values, out[0])
         else:
-            self._call("matrix_function", FUNCTION_NUMBERS[function.kind], index, t, x, parameters, out)
+            self._call("matrix_function", FUNCTION_NUMBERS[function.kind], index, t, x, values, out)
         return out
 
     def _call(
         self, kernel: str, number: int, index: int, t: float, x: Any, parameters: Any, out: np.ndarray
     ) -> None:
         call = vars(load_kernels("hybrid.kernels.evaluate"))[kernel]
-        model = self._model.replace(parameters=self.with_tables(np.array(parameters, dtype=float)))
+        model = self._model.replace(parameters=parameters)
         call(model, number, index, float(t), np.array(x, dtype=float), out)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -216,7 +233,12 @@ class CompiledSystem:
 
     def given(self, parameters: Mapping[str, float] | None, model: Any) -> Any:
         """A model from ``moved_by`` at parameter values; itself for None."""
-        return model if parameters is None and model.period >= 0.0 else self.at(parameters, model)
+        shared = parameters is None and model.period >= 0.0 and self.emitted.row < 0
+        return model if shared else self.at(parameters, model)
+
+    def own(self, model: Any) -> Any:
+        """The same model for one thread alone, if runs write into it: the row of a schedule that fires."""
+        return model if self.emitted.row < 0 else model.replace(parameters=model.parameters.copy())
 
     def at(self, parameters: Mapping[str, float] | None, model: Any) -> Any:
         """A model at parameter values."""
@@ -227,8 +249,8 @@ class CompiledSystem:
         if self.emitted.programs.rows:
             changes["programs"] = self._programs.replace(parameters=values)
         found = model.replace(**changes)
-        # Runs may share a model.
-        values.flags.writeable = False
+        # Runs may share a model, but for one that they write rows into.
+        values.flags.writeable = self.emitted.row >= 0
         return found
 
     def period_at(self, values: np.ndarray, *, given: bool = True) -> float:
@@ -271,9 +293,11 @@ class CompiledSystem:
     def _knots(self) -> Knots:
         return Knots(self.system)
 
-    def with_tables(self, values: np.ndarray) -> np.ndarray:
-        """A parameter vector as kernels get it: with the numbers of the tables behind it."""
-        return np.concatenate([values, self._tables]) if self.emitted.tables else values
+    def with_tables(self, values: np.ndarray, row: int = 0) -> np.ndarray:
+        """A parameter vector as kernels get it, with the row that fires and the tables behind it."""
+        if not self.emitted.tables and self.emitted.row < 0:
+            return values
+        return np.concatenate([values, *([[float(row)]] if self.emitted.row >= 0 else []), self._tables])
 
     def knots_at(self, values: np.ndarray) -> dict[str, np.ndarray]:
         """The times at which tables of time have their points, as fields of a model that has any."""
@@ -283,7 +307,7 @@ class CompiledSystem:
     def _model(self) -> Any:
         system = self.system
         transitions = system.transitions
-        first_outgoing, outgoing = leaving(system, lambda each: not (each.clock or each.guard.at_start))
+        first_outgoing, outgoing = leaving(system, lambda each: each.is_searched)
         first_at_start, at_start = leaving(system, lambda each: each.guard.at_start)
         return Model(
             **self.functions(FIELDS),
@@ -291,6 +315,7 @@ class CompiledSystem:
             variational_field=Absent(),
             series=Absent(),
             **self.emitted.arrays(),
+            row=self.emitted.row,
             parameters=self.with_tables(system.parameter_values()),
             **{**_no_knots(len(system.modes)), **self.knots_at(system.parameter_values())},
             dimension=system.dimension,

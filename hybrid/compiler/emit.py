@@ -36,6 +36,7 @@ from hybrid.compiler.places import placed, places_of
 from hybrid.compiler.propagators.choice import propagator
 from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.readers import is_free, readers
+from hybrid.compiler.rows import place_of_row, with_place_of_row
 from hybrid.compiler.statements.code import Code, Statement, at, put
 from hybrid.compiler.statements.values import assignments, unprintable
 from hybrid.compiler.steep import fields_at_crossings, steep_at_guards, steep_inside
@@ -173,7 +174,8 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
     ]
     cancelling = [each for of_mode in residual for each in of_mode]
     not_affine = [None if affine[i] else expression for i, expression in enumerate(traced)]
-    tables = Tables(len(system.parameters))
+    row = place_of_row([*guards, *conditions, *resets], len(system.parameters))
+    tables = Tables(len(system.parameters) + (row >= 0))
     return Emitted(
         texts={
             part: tables.located("".join(function_text(name, cases_of_index(bodies[name])) for name in names))
@@ -190,6 +192,7 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
             symbols,
             tables,
         ),
+        row=row,
         tables=tables.packed(),
         first_forcing=tuple(accumulate(map(len, pulses), initial=0)),
         forcing_component=tuple(each.component for each in forcing),
@@ -334,6 +337,7 @@ class _Writer:
     def traced(self, function: ModelFunction, *, derivative: bool = False) -> list[Expression]:
         """Expressions of a function or of its derivative; ModelError if it has none that can be compiled."""
         expressions = expressions_of(self.system, function, self.traces, derivative=derivative)
+        expressions = with_place_of_row(expressions, len(self.system.parameters))
         _check_printable(expressions)
         return expressions
 
@@ -441,7 +445,7 @@ def _boundaries(
             _is_affine(written, symbols.variables),
         )
         for transition, written in zip(system.transitions, guards, strict=True)
-        if transition.source == mode and _is_crossed(transition)
+        if transition.source == mode and transition.is_searched
     ]
 
 
@@ -469,13 +473,8 @@ def _guards_in_series(system: HybridSystem, propagators: Sequence[Propagator]) -
     """By transition: whether the series of its source mode hold its guard; none follow guards of a start."""
     held = {mode: iter(each.guards) for mode, each in zip(system.mode_names, propagators, strict=True)}
     return tuple(
-        _is_crossed(transition) and next(held[transition.source], False) for transition in system.transitions
+        transition.is_searched and next(held[transition.source], False) for transition in system.transitions
     )
-
-
-def _is_crossed(transition: Transition) -> bool:
-    """Whether crossings of a guard are searched for."""
-    return transition.clock is None and not transition.guard.at_start
 
 
 def _ends_mode(transition: Transition) -> bool:

@@ -175,6 +175,8 @@ class Emitted:
         By mode: how it is best advanced.
     tangent_start, tangent_start_abreast
         The first column of tangent vectors in series, and in those of runs abreast.
+    row
+        Where functions read the row of a schedule that fires, behind the parameters; -1 if none does.
     tables
         The numbers of all tables, as text (``hybrid.compiler.tables``).
     opaque
@@ -210,6 +212,7 @@ class Emitted:
     propagators: tuple[Propagator, ...]
     tangent_start: int
     tangent_start_abreast: int
+    row: int = -1
     tables: str = ""
     opaque: dict[str, OpaqueFunction] = attrs.field(factory=dict)
 

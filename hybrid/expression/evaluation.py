@@ -10,7 +10,8 @@ import attrs
 
 from hybrid.expression.graph import all_replaced, in_order, listed, listing
 from hybrid.expression.nodes import Expression, Power, Product, Sum, Symbol
-from hybrid.expression.tracing import Traced, model_symbols
+from hybrid.expression.tracing import ROW, Traced, model_symbols
+from hybrid.system.rows import row_that_fires
 
 ARITHMETIC: dict[type[Expression], Callable[..., Any]] = {
     Sum: lambda *terms: reduce(lambda a, b: a + b, terms),
@@ -48,7 +49,7 @@ class Expressed:
                 Traced(each) for each in self._in_terms_of(known, [each.content for each in values])
             ]
         else:
-            results = self._program.run(dict(zip(known, values, strict=True)))
+            results = self._program.run({**dict(zip(known, values, strict=True)), ROW: row_that_fires()})
         return results if self.size is not None else results[0]
 
     def _in_terms_of(self, symbols: Sequence[Symbol], contents: Sequence[Expression]) -> Sequence[Expression]:

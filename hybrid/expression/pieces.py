@@ -118,6 +118,11 @@ def steps(x: np.ndarray, y: np.ndarray) -> Pieces:
     return Pieces(x, np.concatenate([y[:1], y])[:, None])
 
 
+def items(values: np.ndarray) -> Pieces:
+    """One of several numbers, by its place from 0."""
+    return Pieces(np.arange(1.0, len(values)) - 0.5, values[:, None])
+
+
 def lines(x: np.ndarray, y: np.ndarray, left: float | None = None, right: float | None = None) -> Pieces:
     """Straight lines from point to point, constant outside: ``left`` and ``right``, or the values there."""
     values = np.concatenate([y[:1] if left is None else [left], y])

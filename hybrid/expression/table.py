@@ -11,6 +11,7 @@ from hybrid import arguments
 from hybrid.errors import ArgumentError
 from hybrid.expression.pieces import Pieces, lines, spline, steps
 from hybrid.expression.values import is_traced, looked_up
+from hybrid.system.instants import in_unit
 
 KINDS = ("linear", "step", "cubic")
 # A polynomial of a higher degree between two points is no table.
@@ -36,11 +37,17 @@ class Table:
         ``"linear"``: straight lines from point to point, as ``np.interp``. ``"step"``: each value holds from
         its point up to the next. Both are constant outside of the points. ``"cubic"``: the spline of
         ``scipy.interpolate.CubicSpline``; outside, its first and its last piece go on.
+    unit
+        If ``x`` holds dates or durations, the unit of the model's time: ``"ns"``, ``"us"``, ``"ms"``,
+        ``"s"``, ``"min"``, ``"h"``, ``"day"`` or ``"week"``.
+    origin
+        If ``x`` holds dates, the date at which the model's time is 0.
 
     Raises
     ------
     ArgumentError
-        If the points do not increase, are not finite, are fewer than two, or differ in number.
+        If the points do not increase, are not finite, are fewer than two, or differ in number; if dates lack
+        their unit or origin.
 
     Examples
     --------
@@ -59,13 +66,15 @@ class Table:
     kind: str
     _pieces: Pieces
 
-    def __init__(self, x: Any, y: Any = None, kind: str = "linear") -> None:
+    def __init__(
+        self, x: Any, y: Any = None, kind: str = "linear", *, unit: str | None = None, origin: Any = None
+    ) -> None:
         kind = arguments.one_of("kind", kind, KINDS)
         if y is None and all(hasattr(x, name) for name in ("c", "x", "extrapolate")):
             kind, pieces = "cubic", _of_spline(x)
             points, values = pieces.knots, pieces.at(pieces.knots)
         else:
-            points, values = _points(x, y)
+            points, values = _points(x, y, unit, origin)
             pieces = _pieces_of(points, values, kind)
         for each in (points, values):
             each.flags.writeable = False
@@ -81,10 +90,11 @@ class Table:
         return f"Table of {len(self.x)} points from {self.x[0]:g} to {self.x[-1]:g}, kind {self.kind!r}"
 
 
-def _points(x: Any, y: Any) -> tuple[np.ndarray, np.ndarray]:
+def _points(x: Any, y: Any, unit: str | None, origin: Any) -> tuple[np.ndarray, np.ndarray]:
     """The points, checked."""
     if y is None:
         x, y = _taken_apart(x)
+    x = in_unit("x", x, unit, origin)
     points = arguments.numbers("x", x, "be increasing numbers of shape (n,)")
     values = arguments.numbers("y", y, "be numbers of shape (n,)")
     for name, each in (("x", points), ("y", values)):

@@ -61,6 +61,8 @@ def _told(error: Exception) -> str:
 
 
 SYMBOLIC = SymbolicAlgebra()
+# The row of a schedule that fires.
+ROW = Symbol("row")
 
 
 @attrs.frozen
@@ -113,7 +115,7 @@ def trace(
     names = tuple(parameters)
     symbols = model_symbols(state if isinstance(state, int) else len(state), len(names))
     try:
-        expressions = values_of(function, state, names, SYMBOLIC, (symbols.t, symbols.x, symbols.p))
+        expressions = values_of(function, state, names, SYMBOLIC, (symbols.t, symbols.x, symbols.p), row=ROW)
     except ModelError as error:
         if str(error) == NEEDS_TABLE and teach_splines():
             return trace(function, state, names)

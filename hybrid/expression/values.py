@@ -22,7 +22,7 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 from hybrid.errors import ModelError, shown
 from hybrid.expression.branches import refused_branch
 from hybrid.expression.nodes import Expression
-from hybrid.expression.pieces import Pieces, lines
+from hybrid.expression.pieces import Pieces, items, lines
 from hybrid.expression.text import text
 from hybrid.expression.vocabulary import (
     BITWISE,
@@ -42,6 +42,7 @@ from hybrid.expression.vocabulary import (
     WHERE,
     named,
 )
+from hybrid.system.rows import Firing, fires
 from hybrid.system.variables import PARAMETERS, STATE, named_values
 
 
@@ -50,19 +51,15 @@ class Algebra(Protocol):
 
     def number(self, value: Any) -> Any:
         """Content of a traced number with a known value; TypeError or ValueError if it is not a number."""
-        ...
 
     def combined(self, name: str, contents: tuple[Any, ...]) -> Any:
         """Content of the result of a function in ``UFUNCS``, or of ``WHERE``."""
-        ...
 
     def looked_up(self, pieces: Pieces, content: Any, derived: int) -> Any:
         """Content of the value of a table, or of a derivative of some order."""
-        ...
 
     def expression(self, content: Any) -> Any:
         """The expression of a content, for callers that ask for it."""
-        ...
 
 
 _ALGEBRA: ContextVar[Algebra] = ContextVar("_ALGEBRA")
@@ -471,8 +468,12 @@ def values_of(
     parameters: tuple[str, ...],
     algebra: Algebra,
     symbols: tuple[Any, Iterable[Any], Iterable[Any]],
+    *,
+    row: Any = None,
 ) -> list[Any]:
     """Contents of a model function's values, as a flat list, for given contents of ``t``, ``x`` and ``p``.
+
+    ``row`` is the content of the row of a schedule that fires; the first row if it is left out.
 
     Raises
     ------
@@ -489,7 +490,8 @@ def values_of(
     refusals: list[TraceError] = []
     token = _REFUSALS.set(refusals)
     try:
-        with in_terms_of(algebra):
+        firing = Traced(algebra.number(0.0) if row is None else row)
+        with in_terms_of(algebra), fires(Firing(firing, lambda column: looked_up(items(column), firing))):
             contents = [_content(value) for value in _plain(function(Traced(t), x, p)).ravel()]
     finally:
         _REFUSALS.reset(token)

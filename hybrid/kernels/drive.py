@@ -10,7 +10,9 @@ from hybrid.kernels.arithmetic.tables import knots_passed
 from hybrid.kernels.events.clocks import (
     go_to_tick,
     next_tick,
+    number_of_tick,
     pass_tick,
+    show_row,
     ticking,
     turned_to,
     wind,
@@ -112,8 +114,12 @@ def jump_at_tick(parts, task, fired):
     # A new stretch begins with the jump, so the state before it may be kept here.
     for i in range(model.dimension):
         run.stretch[i] = run.y[i]
+    # The tick is counted as over.
+    k = number_of_tick(model, run, fired) - 1
+    show_row(model, run, fired, k)
     parts.jump(task, fired)
     other = turned_to(model, run, fired, run.stretch, task.work.scalar)
+    show_row(model, run, fired, k)
     if other != NO_TRANSITION:
         run.turned += 1
         run.turned_to = other

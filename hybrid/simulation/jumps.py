@@ -14,6 +14,7 @@ from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
 from hybrid.display.tables import counted, html_table
 from hybrid.errors import ArgumentError
+from hybrid.kernels.types.codes import AT
 from hybrid.simulation.labelled import Names, attributes, with_outputs
 from hybrid.simulation.quantities import quantity, values_of
 from hybrid.simulation.saltation import matrices_at
@@ -47,6 +48,8 @@ class Jump:
     kind
         ``"transverse"``, ``"grazing"`` for a crossing so shallow that the tolerances cannot tell it from a
         touch, ``"limit"`` for the end of a chatter.
+    row
+        Of the listed times of an `At`, or of its table, the number of the one that fired; None for others.
 
     Examples
     --------
@@ -69,6 +72,7 @@ class Jump:
     x_plus: np.ndarray
     transversality: float
     kind: str
+    row: int | None
     _all: Jumps = attrs.field(repr=False)
 
     @property
@@ -180,6 +184,7 @@ class Jumps(Sequence[Jump]):
     transversality: np.ndarray
     _kind: np.ndarray
     _has_matrix: np.ndarray
+    _row: np.ndarray
     _states: np.ndarray
     _recorded: np.ndarray
     _sensitivities: Sensitivities | None = None
@@ -268,10 +273,15 @@ class Jumps(Sequence[Jump]):
         model = compile_system(self.system).model(parameters)
         matrices = np.empty((len(self), k, k))
         matrices[self._has_matrix == 1] = recorded
-        matrices[missing], _ = matrices_at(
-            self.system, model, fired, phases, np.ascontiguousarray(self.x_minus[missing])
-        )
+        states, rows = np.ascontiguousarray(self.x_minus[missing]), self._row[missing].tolist()
+        matrices[missing], _ = matrices_at(self.system, model, fired, phases, states, rows)
         return matrices
+
+    @cached_property
+    def row(self) -> np.ndarray:
+        """As in :class:`Jump`, ``(jumps,)``; -1 for None."""
+        listed = [each.clock is not None and each.clock.number == AT for each in self.system.transitions]
+        return np.where(np.array(listed)[self.transition_index], self._row, -1)
 
     def without_component(self, i: int, system: HybridSystem) -> Jumps:
         """The jumps of a system that lacks component ``i``, which has tangent vectors, of that of the run."""
@@ -359,5 +369,6 @@ class Jumps(Sequence[Jump]):
             self.x_plus[i],
             float(self.transversality[i]),
             kind,
+            None if self.row[i] < 0 else int(self.row[i]),
             self,
         )

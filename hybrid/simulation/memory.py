@@ -75,8 +75,8 @@ class Memory:
         self._work_words.fill(0)
         cycle, phase = split_time(t0, model.period)
         self._counters[CYCLE], numbers[PHASE], numbers[HORIZON] = cycle, phase, horizon
-        if plan.ticks is not None:
-            self.run.ticks[:] = plan.ticks(state, model.parameters)
+        if plan.put_ticks is not None:
+            plan.put_ticks(state, model.parameters, self.run.ticks, self.run.rows)
         self._state[:] = state
         if tangent is not None:
             put_tangents(self.run.y, model.dimension, tangent)
@@ -220,7 +220,7 @@ def record_layout(dimension: int, degree: int, steps: int, jumps: int) -> Any:
         "step_place": (steps, 3),
         "step_coefficients": (steps, degree + 1, n + 1),
         "jump_time": (jumps, 3),
-        "jump_place": (jumps, 4),
+        "jump_place": (jumps, 5),
         "jump_states": (jumps, 2, n),
         "jump_saltation": (jumps, n, n),
         "grazing_time": (jumps, 3),
@@ -249,6 +249,7 @@ def run_layout(dimension: int, tangents: int, modes: int, transitions: int, tick
         "tick": (transitions,),
         "ticked": (transitions,),
         "ticks": (ticks,),
+        "rows": (ticks,),
         "first_step": (modes,),
         "stay": (modes,),
         "scale": (n,),

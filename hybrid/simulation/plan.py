@@ -19,7 +19,7 @@ from hybrid.simulation.memory import MOST_LAYOUTS, Memory, no_record, run_layout
 from hybrid.solvers import Solver, Taylor
 from hybrid.solvers.tableau import SERIES_NODES, SERIES_WEIGHTS
 from hybrid.status import StatusCode
-from hybrid.system.graph import ticks_of
+from hybrid.system.ticking import put_ticks
 
 DEFAULT_SOLVER = Taylor()
 # Memories that are kept for later: those of a crew for each of a few threads.
@@ -58,7 +58,7 @@ class Plan:
     degree: int
     run_layout: Any
     work_layout: Any
-    ticks: Callable[[np.ndarray, np.ndarray], list[float]] | None = None
+    put_ticks: Callable[..., None] | None = None
     by_steps: int | None = None
     spares: list[Memory] = attrs.field(factory=list, init=False)
     # What crews of the plan have in common, once it is known (``crew``).
@@ -144,7 +144,7 @@ def plan_of(compiled: CompiledSystem, solver: Solver, tangents: int, by_steps: i
             dense_degree(compiled, method, kinds),
             run_layout(n, tangents, modes, transitions, system.first_tick[-1]),
             work_layout(method, n, tangents, guards, columns, rows),
-            partial(ticks_of, system) if system.first_tick[-1] else None,
+            partial(put_ticks, system) if system.first_tick[-1] else None,
             by_steps,
         )
         while len(compiled.plans) >= MOST_LAYOUTS:

@@ -29,7 +29,7 @@ class StepRows(NamedTuple):
 
 
 class JumpRows(NamedTuple):
-    """What kernels write of ``J`` jumps: ``(J, 3)``, ``(J, 4)``, ``(J, 2, n)``, and matrices of some."""
+    """What kernels write of ``J`` jumps: ``(J, 3)``, ``(J, 5)``, ``(J, 2, n)``, and matrices of some."""
 
     time: np.ndarray
     place: np.ndarray
@@ -74,9 +74,9 @@ class Course:
     def jumps(self, rows: JumpRows) -> Jumps:
         """The jumps that a run wrote down."""
         phase, low, transversality = rows.time.T.copy()
-        cycle, transition, kind, has_matrix = rows.place.T.copy()
+        cycle, transition, kind, has_matrix, row = rows.place.T.copy()
         t = time_at(cycle, phase, low, self.period)
-        columns = t, phase, transition, transversality, kind, has_matrix, rows.states, rows.saltation
+        columns = t, phase, transition, transversality, kind, has_matrix, row, rows.states, rows.saltation
         return Jumps(self.system, self.values, *columns)
 
 
@@ -216,7 +216,7 @@ def unfilled(samples: int, dimension: int) -> Filled:
 def no_jumps(dimension: int) -> JumpRows:
     """No jumps; any number of arcs can have the same."""
     n = dimension
-    place = np.empty((0, 4), dtype=np.int64)
+    place = np.empty((0, 5), dtype=np.int64)
     return JumpRows(np.empty((0, 3)), place, np.empty((0, 2, n)), np.empty((0, n, n)))
 
 

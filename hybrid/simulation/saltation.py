@@ -16,6 +16,7 @@ from hybrid.simulation.memory import workspace
 from hybrid.simulation.periods import check_time, split_time
 from hybrid.simulation.plan import kernel_method
 from hybrid.solvers import Tsit5
+from hybrid.system.clocks import ticks_of
 from hybrid.system.elements import Transition
 from hybrid.system.graph import HybridSystem
 
@@ -77,7 +78,8 @@ def saltation_matrix(
     t = arguments.number("t", t)
     check_time("t", t, model.period)
     phase = split_time(t, model.period)[1]
-    matrices, (transversality,) = matrices_at(system, model, [index], [phase], state[None])
+    rows = [_row_at(system, index, t, state, model)]
+    matrices, (transversality,) = matrices_at(system, model, [index], [phase], state[None], rows)
     if not np.all(np.isfinite(matrices)):
         raise ArgumentError(
             f"Transition {system.transitions[index].name!r}: the saltation matrix does not exist at t = {t}, "
@@ -87,15 +89,35 @@ def saltation_matrix(
     return matrices[0]
 
 
+def _row_at(system: HybridSystem, transition: int, t: float, x: np.ndarray, model: Any) -> int:
+    """The row of a schedule whose time is nearest, the first of equal ones; 0 for what has no rows."""
+    clock = system.transitions[transition].clock
+    if clock is None:
+        return 0
+    values = model.parameters[: len(system.parameters)]
+    ticks, rows = ticks_of(clock, system.variables.state_view(x), system.variables.parameter_view(values))
+    return int(np.broadcast_to(rows, len(ticks))[np.argmin(np.abs(np.subtract(ticks, t)))])
+
+
 def matrices_at(
-    system: HybridSystem, model: Any, transitions: list[int], phases: list[float], states: np.ndarray
+    system: HybridSystem,
+    model: Any,
+    transitions: list[int],
+    phases: list[float],
+    states: np.ndarray,
+    rows: list[int],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Saltation matrices ``(J, k, k)`` and transversalities ``(J,)`` of transitions at states ``(J, n)``."""
+    """Saltation matrices ``(J, k, k)`` and transversalities ``(J,)`` of transitions at states ``(J, n)``.
+
+    The model is that of this thread alone. ``rows`` are those of schedules that fire.
+    """
     n = system.dimension
     matrices, transversalities = np.empty((len(states), n, n)), np.empty(len(states))
     kernel = load_kernels("hybrid.kernels.jumps.jump").saltation
     work, x_plus = workspace(kernel_method(Tsit5(), False), n), np.empty(n)
     for i, (fired, phase, state) in enumerate(zip(transitions, phases, states, strict=True)):
+        if model.row >= 0:
+            model.parameters[model.row] = rows[i]
         transversalities[i] = kernel(model, fired, phase, state, x_plus, work)
         matrices[i] = work.saltation
     k = system.tangent_dimension

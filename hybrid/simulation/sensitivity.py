@@ -83,12 +83,36 @@ class Sensitivities:
         # A jump that another sets off happens at the time of that one.
         first = np.flatnonzero((jumps.t > before) & (jumps.kind != "limit"))
         middles = 0.5 * (before[first] + jumps.t[first])
-        for i, t, (x, tangents) in zip(first, middles, self._at(middles), strict=True):
+        places = self._at(middles)
+        for i, t, (x, tangents) in zip(first, middles, places, strict=True):
             found[i] = self._time_of(jumps[int(i)], float(t), x, tangents)
+        # The last of those jumps that is not behind each one.
+        instants = np.searchsorted(first, np.arange(len(jumps)), side="right") - 1
         for k in range(1, len(jumps)):
             if jumps.t[k] == jumps.t[k - 1] and jumps.kind[k] != "limit":
-                found[k] = found[k - 1]
+                tick = self._time_of_tick(jumps[k], places[instants[k]][1]) if instants[k] >= 0 else None
+                found[k] = found[k - 1] if tick is None else tick
         return self._of_run(found)
+
+    def _time_of_tick(self, jump: Jump, tangents: np.ndarray) -> np.ndarray | None:
+        """Derivatives ``(n + m,)`` of the time of a tick, which other jumps at its instant do not set off.
+
+        They depend on components that do not move, so ``tangents`` may be those of any time since the last
+        instant. None for other jumps.
+        """
+        clock = self.arc.system.transitions[self.arc.system.transition_index(jump.transition)].clock
+        if clock is None or clock.counts_from_entry:
+            return None
+        slope, _ = self._slope(jump, jump.t, self._place(jump))
+        return -(slope @ tangents) / jump.transversality
+
+    def _place(self, jump: Jump) -> np.ndarray:
+        """The state before a jump, with what the run with derivatives has besides."""
+        system, assumed = self.arc.system, self.jumps
+        assert assumed is not None, "only the jumps of a run have times"
+        parameters = self.x0[self._first : system.tangent_dimension]
+        place = with_parameters(self.counted.original, with_age(assumed.system, jump.x_minus), parameters)
+        return self.counted.state(jump.t, place, self.arc.parameters)
 
     def _of_run(self, rows: np.ndarray) -> np.ndarray:
         """Derivatives in the start of the run itself and in the parameters, from those in all components."""
@@ -123,15 +147,8 @@ class Sensitivities:
         The guard of a tank that runs dry comes to rest where its root vanishes. There its change and its
         speed are both zero, and their quotient follows from places before.
         """
-        system, assumed = self.arc.system, self.jumps
-        assert assumed is not None, "only the jumps of a run have times"
-        place = with_parameters(
-            self.counted.original,
-            with_age(assumed.system, jump.x_minus),
-            self.x0[self._first : system.tangent_dimension],
-        )
-        place = self.counted.state(jump.t, place, self.arc.parameters)
-        slope, _ = self._slope(jump, jump.t, place)
+        system = self.arc.system
+        slope, _ = self._slope(jump, jump.t, self._place(jump))
         if compile_system(system).emitted.steep[system.mode_index(jump.source)]:
             before = [self._moved(jump, t, x, tangents, share) for share in BEFORE_REST]
             slopes = [self._slope(jump, when, state) for when, state, _ in before]
@@ -161,7 +178,7 @@ class Sensitivities:
         index, mode = system.transition_index(jump.transition), system.mode_index(jump.source)
         values = system.parameter_values(self.arc.parameters)
         function = guard_function(system.transitions[index])
-        [slope] = compile_system(system).derivative(function, index, t, x, values)
+        [slope] = compile_system(system).derivative(function, index, t, x, values, jump.row or 0)
         field = field_function(system.modes[mode], system.variables).value
         rates = evaluate(system.variables, field, t, x, values)
         speed = np.nan if rates is None else slope[:-1] @ rates + slope[-1]

@@ -278,14 +278,15 @@ class _Runs:
         origins, states = found.origins[part], found.states[part]
         places = np.zeros((len(block), 3), dtype=np.int64)
         (t0, t1), count = self.t_span, min(len(block), TOGETHER)
-        memories, phase0 = berths(plan, self.model, count, origins[0], t0, t1 - t0)
+        model = self.compiled.own(self.model)
+        memories, phase0 = berths(plan, model, count, origins[0], t0, t1 - t0)
         queue, counters = np.zeros(1, dtype=np.int64), np.zeros((count, 1), dtype=np.int64)
         starts = [starts_of(each, origins, queue, named=self.named, found=places) for each in memories]
         common = Sampled(
             counters=counters[0], starts=starts[0], cycles=self.cycles, phases=self.phases, states=states
         )
         jobs = [common.replace(counters=counters[i], starts=each) for i, each in enumerate(starts)]
-        tasks = [each.task(self.model, orthonormal=False) for each in memories]
+        tasks = [each.task(model, orthonormal=False) for each in memories]
         crew = Crew(together(self.compiled, plan, 0), plan, tasks, jobs)
         most = self.options["solver"].max_steps
         crew.memory.max_steps[:], crew.memory.max_jumps[:] = most, self.max_jumps
@@ -314,7 +315,7 @@ class _Runs:
                     # is allowed.
                     self.one_by_one.run(range(block.start + i, block.start + i + 1))
                     continue
-                trajectory = Trajectory(self.compiled, plan, self.model, memories[row], 0, most, phase0)
+                trajectory = Trajectory(self.compiled, plan, model, memories[row], 0, most, phase0)
                 self._tell(block.start + i, trajectory, code, jobs[row].starts.verdicts)
         done = np.arange(len(block)) < queue[0]
         done &= ~is_told

@@ -14,6 +14,7 @@ from hybrid.errors import ModelError
 from hybrid.system.derivatives import check_derivative, evaluate, sample_points
 from hybrid.system.functions import CONDITION, ModelFunction, WholeReset
 from hybrid.system.periodicity import Period, angle_fault_at, period_at, period_fault
+from hybrid.system.rows import fires, plain_firing
 from hybrid.system.variables import Variables
 from hybrid.system.watched import is_of_library
 
@@ -122,7 +123,9 @@ def _arguments(variables: Variables) -> tuple[Any, ...]:
 
 def _check_function(variables: Variables, function: ModelFunction) -> None:
     arguments = _arguments(variables)
-    value = _call(function.title, function.function if function.still else function.value, arguments)
+    called = function.function if function.still else function.value
+    with fires(plain_firing(0, function.schedules)):
+        value = _call(function.title, called, arguments)
     if value is not None:
         _check_value(variables, function, value[0])
         _check_pure(variables, function)

@@ -17,7 +17,7 @@ from hybrid.system.portable import Portable
 Quantity = Any
 
 
-def _as_quantity(kind: str, name: str, value: Any) -> Quantity:
+def as_quantity(kind: str, name: str, value: Any) -> Quantity:
     """A quantity as the user gave it, checked as far as it can be without parameters."""
     if callable(value) or (isinstance(value, str) and value.isidentifier()):
         return value
@@ -42,12 +42,17 @@ def numbers_of(clock: Clock, x: Any, p: Any) -> tuple[Any, ...]:
     return clock._numbers(x, p)
 
 
+def ticks_of(clock: Clock, x: Any, p: Any) -> tuple[Sequence[float], Any]:
+    """The numbers of a clock as kernels get them, and the row of a schedule that each belongs to."""
+    return clock._ticks(x, p)
+
+
 def fault_of(clock: Clock, numbers: Sequence[float]) -> str:
     """What is wrong with the numbers of a clock, in words; empty if they are right."""
     return clock._fault(numbers)
 
 
-def _short(quantity: Quantity) -> str:
+def in_few_words(quantity: Quantity) -> str:
     """A quantity in few words."""
     if isinstance(quantity, float):
         return f"{quantity:.6g}"
@@ -66,7 +71,7 @@ class Since:
         return self.clock._since_tick(t if age is None else x[age], self.clock._numbers(x, p))
 
 
-@attrs.frozen
+@attrs.frozen(eq=False)
 class Clock(Portable):
     """What clocks have in common: each is a guard whose zeros in time are known, so none is searched for.
 
@@ -95,6 +100,9 @@ class Clock(Portable):
             if fault:
                 raise ModelError(f"{type(self).__name__}: {fault}.")
 
+    # The table whose columns the reset reads, if there is one.
+    schedule: ClassVar[Any] = None
+
     @property
     def when(self) -> Callable[..., Any] | None:
         """The condition of a tick, if there is one."""
@@ -114,6 +122,14 @@ class Clock(Portable):
         """The numbers of the clock at a state and parameters; only parameters matter here."""
         return tuple(read(quantity, p) for quantity in self.quantities)
 
+    def _ticks(self, x: Any, p: Any) -> tuple[Sequence[float], Any]:
+        """The numbers as kernels get them, and the row of a schedule that each belongs to."""
+        return self._in_order(self._numbers(x, p))
+
+    def _in_order(self, numbers: Sequence[Any]) -> tuple[Sequence[float], Any]:
+        """The same from numbers in the order of ``quantities``."""
+        return tuple(map(float, numbers)), 0
+
     def _since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
         """Time since the nearest tick, negative before it, at the clock's numbers."""
         raise NotImplementedError
@@ -124,18 +140,19 @@ class Clock(Portable):
 
 
 def _as_period(value: Any) -> Quantity:
-    return _as_quantity("Every", "period", value)
+    return as_quantity("Every", "period", value)
 
 
 def _as_offset(value: Any) -> Quantity:
-    return _as_quantity("Every", "offset", value)
+    return as_quantity("Every", "offset", value)
 
 
 def _as_duration(value: Any) -> Quantity:
-    return _as_quantity("After", "duration", value)
+    return as_quantity("After", "duration", value)
 
 
-def _check_when(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
+def check_when(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
+    """ModelError unless a condition is a function."""
     if value is not None and not callable(value):
         raise ModelError(
             f"{type(instance).__name__}: when must be a function of (t, x, p); got {shown(value)}."
@@ -173,7 +190,7 @@ class Every(Clock):
 
     period: Quantity = attrs.field(converter=_as_period)
     offset: Quantity = attrs.field(default=0.0, converter=_as_offset)
-    when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=_check_when)
+    when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=check_when)
     number: ClassVar[int] = 1
 
     @property
@@ -184,7 +201,7 @@ class Every(Clock):
     @property
     def told(self) -> str:
         """When the clock ticks, in few words."""
-        return f"every {_short(self.period)}"
+        return f"every {in_few_words(self.period)}"
 
     def _since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
         """Time since the nearest tick."""
@@ -197,76 +214,6 @@ class Every(Clock):
         if not 0.0 < period < math.inf:
             return f"period must be positive and finite; got {period:.6g}"
         return "" if math.isfinite(offset) else f"offset must be finite; got {offset:.6g}"
-
-
-def _as_times(value: Any) -> tuple[Quantity, ...]:
-    given = (value,) if isinstance(value, str) or callable(value) else value
-    each_time = arguments.items("At: times", given, "be a list of times")
-    found = tuple(_as_quantity("At", f"times[{i}]", each) for i, each in enumerate(each_time))
-    if not found:
-        raise ModelError("At: times must hold at least one time; got none.")
-    return found
-
-
-@attrs.frozen
-class At(Clock):
-    """A clock that ticks at listed times, in the place of a guard; a tick is found by a search, however many.
-
-    A tick at the start of a run does not fire, one at its end does. For more, see `Every`.
-
-    Parameters
-    ----------
-    times
-        Times in increasing order, each a number, the name of a parameter, or a function of ``p``.
-    when
-        Optional condition ``c(t, x, p)``, as that of a `Guard`: a tick without it is passed over.
-
-    Raises
-    ------
-    ModelError
-        If there is no time, one is not finite, they do not increase, or ``when`` is not a function.
-
-    Examples
-    --------
-    >>> import hybrid
-    >>> dose = hybrid.Transition(
-    ...     "run", "run", hybrid.At([0.0, 24.0, 48.0]), hybrid.Reset(lambda t, x, p: {"A": x.A + p.dose})
-    ... )
-    >>> len(dose.guard.times)
-    3
-    """
-
-    times: tuple[Quantity, ...] = attrs.field(converter=_as_times)
-    when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=_check_when)
-    number: ClassVar[int] = 2
-
-    @property
-    def quantities(self) -> tuple[Quantity, ...]:
-        """The times."""
-        return self.times
-
-    @property
-    def told(self) -> str:
-        """When the clock ticks, in few words."""
-        return f"at {_short(self.times[0])}" if len(self.times) == 1 else f"at {len(self.times)} times"
-
-    def _since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
-        """Time since the nearest time; since the first one if no parameter moves any."""
-        nearest = numbers[0]
-        for each in numbers[1:] if not all(isinstance(given, float) for given in self.times) else ():
-            nearest = np.where(np.abs(t - each) < np.abs(t - nearest), each, nearest)
-        return t - nearest
-
-    def _fault(self, numbers: Sequence[float]) -> str:
-        """What is wrong with the times."""
-        before = -math.inf
-        for i, after in enumerate(numbers):
-            if not math.isfinite(after):
-                return f"times[{i}] must be finite; got {after:.6g}"
-            if not after > before:
-                return f"times must increase; got times[{i}] = {after:.10g} after {before:.10g}"
-            before = after
-        return ""
 
 
 @attrs.frozen
@@ -299,7 +246,7 @@ class After(Clock):
     """
 
     duration: Quantity = attrs.field(converter=_as_duration)
-    when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=_check_when)
+    when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=check_when)
     number: ClassVar[int] = 3
     counts_from_entry: ClassVar[bool] = True
 
@@ -311,7 +258,7 @@ class After(Clock):
     @property
     def told(self) -> str:
         """When the clock ticks, in few words."""
-        return f"after {_short(self.duration)}"
+        return f"after {in_few_words(self.duration)}"
 
     def _since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
         """Time since the tick of a mode that was entered at time 0."""
@@ -349,6 +296,11 @@ class DerivedClock(Clock):
         return self.clock.counts_from_entry
 
     @property
+    def schedule(self) -> Any:
+        """That of the original."""
+        return self.clock.schedule
+
+    @property
     def quantities(self) -> tuple[Quantity, ...]:
         """Those of the original."""
         return self.clock.quantities
@@ -361,6 +313,10 @@ class DerivedClock(Clock):
     def _numbers(self, x: Any, p: Any) -> tuple[Any, ...]:
         """The numbers of the clock at a state and parameters."""
         return tuple(self.read(x, p))
+
+    def _ticks(self, x: Any, p: Any) -> tuple[Sequence[float], Any]:
+        """The numbers as kernels get them."""
+        return self.clock._in_order(self._numbers(x, p))
 
     def _since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
         """Time since the nearest tick."""

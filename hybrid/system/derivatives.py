@@ -14,6 +14,7 @@ import numpy as np
 
 from hybrid.errors import ModelError
 from hybrid.system.functions import ModelFunction
+from hybrid.system.rows import fires, plain_firing
 from hybrid.system.variables import Variables
 
 COMPLEX_STEP = 1e-30
@@ -129,15 +130,17 @@ def evaluate(
     parameters: np.ndarray,
     *,
     finite: bool = True,
+    row: int = 0,
 ) -> Any:
     """Values of a model function as a flat array, or None if the call fails or a value is not finite.
 
-    With ``finite=False`` values that are not finite are returned too.
+    With ``finite=False`` values that are not finite are returned too. ``row`` of a
+    schedule fires.
     """
     assert function is not None
     p = variables.parameter_view(parameters)
     try:
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), fires(plain_firing(row)):
             values = np.ravel(np.asarray(function(np.float64(t), variables.state_view(x), p), dtype=float))
     except Exception:  # whatever the cause, the function has no value there
         return None
@@ -237,7 +240,7 @@ def complex_step(
         state = (
             z.view(_ComplexState) if isinstance(variables.state, int) else variables.state_view(z.tolist())
         )
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
+        with warnings.catch_warnings(), np.errstate(all="ignore"), fires(plain_firing(0)):
             # A complex number stored in a real array loses the derivative, with only a warning.
             warnings.simplefilter("error", np.exceptions.ComplexWarning)
             values = np.asarray(function.value(complex(t, shift[-1]), state, p), dtype=complex)

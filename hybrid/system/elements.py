@@ -274,6 +274,11 @@ class Transition(Portable):
         return self.guard if isinstance(self.guard, Clock) else None
 
     @property
+    def is_searched(self) -> bool:
+        """Whether crossings of the guard are searched for: not those of a clock, or of a start alone."""
+        return isinstance(self.guard, Guard) and not self.guard.at_start
+
+    @property
     def is_marker(self) -> bool:
         """Whether the transition changes neither mode nor state, and only marks a crossing."""
         return self.source == self.target and self.reset is None

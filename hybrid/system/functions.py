@@ -119,6 +119,8 @@ class ModelFunction:
         the components of a field that are held or count.
     counted
         How many of the values, the last ones, are counters after a reset: no derivative is taken of them.
+    schedules
+        Those whose columns the function may read.
     completed
         Names of the state's components, or their number, if the function may return those that change alone:
         that of a reset. Else None.
@@ -133,6 +135,7 @@ class ModelFunction:
     completed: tuple[str, ...] | int | None = None
     still: int = 0
     counted: int = 0
+    schedules: tuple[Any, ...] = ()
 
     @property
     def value(self) -> Callable[..., Any]:
@@ -211,7 +214,10 @@ def condition_function(transition: Transition) -> ModelFunction | None:
     """The condition of a transition's guard; None without a condition."""
     if transition.guard.when is None:
         return None
-    return ModelFunction(f"Transition {transition.name!r}", CONDITION, transition.guard.when, "", None, None)
+    owner = f"Transition {transition.name!r}"
+    return ModelFunction(
+        owner, CONDITION, transition.guard.when, "", None, None, schedules=schedules_of(transition)
+    )
 
 
 def reset_function(transition: Transition, variables: Variables) -> ModelFunction | None:
@@ -228,7 +234,14 @@ def reset_function(transition: Transition, variables: Variables) -> ModelFunctio
         variables.dimension,
         variables.components,
         counted=len(variables.counters),
+        schedules=schedules_of(transition),
     )
+
+
+def schedules_of(transition: Transition) -> tuple[Any, ...]:
+    """The schedule that a transition has in the place of a guard, if it has one."""
+    schedule = None if transition.clock is None else transition.clock.schedule
+    return () if schedule is None else (schedule,)
 
 
 def functions_in(

@@ -11,9 +11,8 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
-from hybrid.errors import ArgumentError, ModelError, unknown_name
+from hybrid.errors import ModelError, unknown_name
 from hybrid.system.checks import check_angles, check_functions
-from hybrid.system.clocks import fault_of, numbers_of
 from hybrid.system.described import described, described_in_html
 from hybrid.system.elements import END, Mode, Transition
 from hybrid.system.functions import ModelFunction, functions_in
@@ -402,24 +401,6 @@ class HybridSystem(Portable):
                 f"HybridSystem: no transition joins mode {lonely[0]!r} to the others. Modes: "
                 f"{', '.join(self.mode_names)}. Add a transition, or make it a separate system."
             )
-
-
-def ticks_of(system: HybridSystem, x: np.ndarray, parameters: np.ndarray) -> list[float]:
-    """The numbers of all clocks at a state and parameters; ArgumentError if one cannot be."""
-    # The numbers of tables are behind the parameters.
-    own = parameters[: len(system.parameters)].tolist()
-    view, p = system.variables.state_view(x), system.variables.parameter_view(own)
-    found: list[float] = []
-    for transition in system.transitions:
-        clock = transition.clock
-        if clock is not None:
-            numbers = tuple(map(float, numbers_of(clock, view, p)))
-            fault = fault_of(clock, numbers)
-            if fault:
-                owner = f"Transition {transition.name!r}: {type(clock).__name__}"
-                raise ArgumentError(f"{owner}: {fault} with these parameters.")
-            found += numbers
-    return found
 
 
 def check_mode(system: HybridSystem, name: object, what: str = "Mode") -> None:

@@ -15,6 +15,7 @@ from hybrid.system.elements import Function
 from hybrid.system.labels import named
 from hybrid.system.outputs import Component, Output, function_in
 from hybrid.system.portable import Portable
+from hybrid.system.rows import fires, plain_firing
 from hybrid.system.variables import Variables
 
 NOT_NAMED = "be a function of (t, minus, plus, p)"
@@ -259,7 +260,8 @@ def placed(
         arguments.known("continuous: Transition", name, transitions, "Transitions")
     for law in laws.across:
         arguments.known("across: Transition", law.of, transitions, "Transitions")
-        trial(variables, f"across: {law.name!r}", law.quantity, of_jump=True)
+        with fires(plain_firing(0)):
+            trial(variables, f"across: {law.name!r}", law.quantity, of_jump=True)
     return attrs.evolve(laws, **found)
 
 

@@ -38,6 +38,7 @@ from hybrid.testing.saltation import (
 )
 from hybrid.testing.small import small_systems
 from hybrid.testing.strategies import cases, parameters, run_settings, states
+from hybrid.testing.ticks import check_ticks
 from hybrid.testing.units import check_units
 
 __all__ = [
@@ -77,6 +78,7 @@ __all__ = [
     "check_split",
     "check_sum_rule",
     "check_system",
+    "check_ticks",
     "check_units",
     "discard",
     "parameters",

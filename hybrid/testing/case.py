@@ -207,17 +207,21 @@ class Case:
         """Parameter vector ``(m,)``."""
         return self.system.parameter_values(self.parameters)
 
-    def evaluate(self, function: Any, t: float, x: Any) -> np.ndarray:
-        """Evaluate a model function in plain Python, as a flat array; discard the example if not finite."""
-        values = evaluate(self.system.variables, function, t, np.asarray(x, dtype=float), self.values)
+    def evaluate(self, function: Any, t: float, x: Any, row: int = 0) -> np.ndarray:
+        """Evaluate a model function in plain Python, as a flat array; discard the example if not finite.
+
+        ``row`` is that of a schedule that fires.
+        """
+        state = np.asarray(x, dtype=float)
+        values = evaluate(self.system.variables, function, t, state, self.values, row=row)
         if values is None:
             discard("a model function is not finite")
         return np.asarray(values)
 
-    def after(self, transition: Transition, t: float, x: Any) -> np.ndarray:
-        """The state ``(n,)`` after a transition from ``(t, x)``."""
-        reset = reset_function(transition, self.system.variables)
-        return np.array(x, dtype=float) if reset is None else self.evaluate(reset.value, t, x)
+    def after(self, jump: Jump, t: float, x: Any) -> np.ndarray:
+        """The state ``(n,)`` after the transition of a jump, from ``(t, x)``."""
+        reset = reset_function(self.transition(jump), self.system.variables)
+        return np.array(x, dtype=float) if reset is None else self.evaluate(reset.value, t, x, jump.row or 0)
 
     def is_wall(self, transition: Transition) -> bool:
         """Whether no state lies beyond the guard of a transition, in its direction, and stays in the mode.

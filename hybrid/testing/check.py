@@ -75,6 +75,7 @@ from hybrid.testing.saltation import (
     check_sum_rule,
 )
 from hybrid.testing.strategies import Ranges, all_laws, cases
+from hybrid.testing.ticks import TICKS, check_ticks
 from hybrid.testing.units import UNITS, check_units
 from hybrid.transform.aged import aged
 
@@ -225,6 +226,7 @@ def _properties(
         SIDES: check_sides,
         LANDINGS: check_landings,
         CROSSINGS: check_crossings,
+        TICKS: check_ticks,
         JUMPS: check_jumps,
         OUTPUTS: check_outputs,
         UNITS: check_units,
@@ -245,6 +247,7 @@ def _properties(
         ANGLES: bool(system.angles),
         OUTPUTS: bool(system.outputs),
         LANDINGS: any(each.reset is not None for each in system.transitions),
+        TICKS: any(each.clock for each in system.transitions),
         LIMITS: any(each.accumulates_to for each in system.transitions),
         ORDER: len(system.transitions) > 1 and not system.listed_order,
     }

@@ -66,7 +66,7 @@ def check_jumps(case: Case) -> None:
                 f"the guard's speed is {jump.transversality:.6g}, its direction {transition.guard.direction}",
                 hint="a guard that fires in the wrong direction.",
             )
-        wanted = case.after(transition, jump.t, jump.x_minus)
+        wanted = case.after(jump, jump.t, jump.x_minus)
         if not np.all(np.abs(jump.x_plus - wanted) <= 1e-12 * (np.abs(wanted) + run.scale)):
             case.fail(
                 JUMPS,

@@ -49,10 +49,10 @@ def check_landings(case: Case) -> None:
         if transition.reset is None or locked:
             continue
         seen = True
-        wanted = case.after(transition, jump.t, jump.x_minus)
+        wanted = case.after(jump, jump.t, jump.x_minus)
         for way in (-np.inf, np.inf):
             t, x = np.nextafter(jump.t, way), np.nextafter(jump.x_minus, way)
-            got = case.after(transition, t, x)
+            got = case.after(jump, t, x)
             if np.any(np.abs(got - wanted) > BY_ROUNDING * (np.abs(wanted) + case.run.scale)):
                 case.fail(
                     LANDINGS,

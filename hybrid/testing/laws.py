@@ -14,6 +14,7 @@ from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.jumps import Jump
 from hybrid.system.laws import Law, Laws
 from hybrid.system.outputs import function_in
+from hybrid.system.rows import fires, plain_firing
 from hybrid.testing.case import Case, as_case, jump_told, lasting, matrix_told
 from hybrid.testing.ends import whole_run
 from hybrid.testing.errors import PropertyError, discard
@@ -207,19 +208,20 @@ def _check_across(case: Case, law: Law) -> None:
     """Fail if the rule of a transition does not hold at one of its jumps."""
     variables, p = case.system.variables, case.system.variables.parameter_view(case.values)
 
-    def rule(t: float, minus: Any, plus: Any) -> Any:
-        with np.errstate(all="ignore"):
+    def rule(t: float, minus: Any, plus: Any, row: int) -> Any:
+        with np.errstate(all="ignore"), fires(plain_firing(row)):
             return np.asarray(law.quantity(t, variables.state_view(minus), variables.state_view(plus), p))
 
     scale = np.tile(np.abs(whole_run(case).x).max(axis=0), 2)
     for jump in _jumps_of(case, law.of):
-        found = rule(jump.t, jump.x_minus, jump.x_plus)
+        there = partial(rule, jump.t, row=jump.row or 0)
+        found = there(jump.x_minus, jump.x_plus)
         if found.dtype == bool:
             holds, got = bool(found.all()), "it does not hold"
         else:
             n = len(jump.x_minus)
             both = np.concatenate([jump.x_minus, jump.x_plus])
-            size = _sizes(lambda x, t=jump.t, n=n: rule(t, x[:n], x[n:]), both, found, scale)  # type: ignore[misc]
+            size = _sizes(partial(_of_halves, there, n), both, found, scale)
             holds = bool(np.all(np.abs(found) <= TOLERANCE * size))
             got = f"got {matrix_told(found)}, not zero"
         if not holds:
@@ -231,6 +233,11 @@ def _check_across(case: Case, law: Law) -> None:
                 "not write; or it fires where it should not.",
                 time=jump.t,
             )
+
+
+def _of_halves(rule: Callable[..., Any], n: int, both: np.ndarray) -> Any:
+    """A rule of the states ``(n,)`` before and after a jump, which come in one row."""
+    return rule(both[:n], both[n:])
 
 
 def _check_continuous(case: Case, name: str, told: str) -> None:

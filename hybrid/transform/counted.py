@@ -33,7 +33,7 @@ from hybrid.expression.operations import (
     TruncatedRemainder,
     WholeQuotient,
 )
-from hybrid.expression.pieces import Pieces
+from hybrid.expression.pieces import Pieces, items
 from hybrid.expression.tabulated import Tabulated
 from hybrid.expression.tracing import TraceError, model_symbols, trace
 from hybrid.system.clocks import Clock, DerivedClock, numbers_of
@@ -287,8 +287,7 @@ def _without_narrow(knots: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np
     return knots[wide], rows[[0, *(1 + np.flatnonzero(wide))]]
 
 
-def _item(c: Symbol, items: Any) -> Expression:
+def _item(c: Symbol, numbers: Any) -> Expression:
     """One of several numbers, by the count."""
-    knots = np.arange(1.0, len(items)) - 0.5
-    found: Expression = Tabulated(c, Pieces(knots, np.array(items, dtype=float)[:, None]))
+    found: Expression = Tabulated(c, items(np.array(numbers, dtype=float)))
     return found

@@ -70,6 +70,10 @@ RUNS = {
             "t_span": (0.0, 7.0),
         },
     ),
+    "infusion_schedule": (
+        models.infusion_schedule(),
+        {"states": {"c": (0.0, 5.0), "r": (0.0, 10.0)}, "t_span": (0.0, 30.0)},
+    ),
     "impact_oscillator": (models.impact_oscillator(), {"states": {"x": (-1.0, 0.7)}, "t_span": (0.0, 7.0)}),
     "impact_pair": (models.impact_pair(), {"states": {"x": (-1.5, 1.5)}, "t_span": (0.0, 8.0)}),
     "refractory_neuron": (
@@ -148,6 +152,7 @@ MORE_UNCHECKED = {
     "buck_converter": {CUT, SUM_RULE},
     "boost_converter": {CUT, SUM_RULE},
     "dosing_schedule": TIMED,
+    "infusion_schedule": TIMED,
     "sampled_loop": {*TIMED, SUM_RULE},
     "battery_cell": {FLOW_DIRECTION},
     # The age that tangent vectors need has no unit.

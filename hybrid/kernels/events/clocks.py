@@ -71,6 +71,12 @@ def rounding_of_tick(model, run, transition, k):
 
 
 @njit(**KERNEL)
+def is_behind(model, run, transition, k):
+    """Whether tick ``k`` is over, by more than its rounding."""
+    return time_to_tick(model, run, transition, k) < -rounding_of_tick(model, run, transition, k)
+
+
+@njit(**KERNEL)
 def first_from(model, run, transition, beyond):
     """The first tick that is not behind, or with ``beyond`` the first that is ahead."""
     kind, first = model.clock[transition], model.first_tick[transition]
@@ -80,6 +86,9 @@ def first_from(model, run, transition, beyond):
     else:
         # One tick earlier than the last that has passed: that one may be of this instant.
         k = max(knots_passed(run.ticks, first, model.first_tick[transition + 1], now) - 2, 0)
+        # Several times may be equal.
+        while k > 0 and not is_behind(model, run, transition, k):
+            k -= 1
     while True:
         left = time_to_tick(model, run, transition, k)
         band = rounding_of_tick(model, run, transition, k)
@@ -137,6 +146,22 @@ def number_of_tick(model, run, transition):
 
 
 @njit(**KERNEL)
+def show_row(model, run, transition, k):
+    """Tell which row of its schedule tick ``k`` is; the functions of the model, too, if they ask."""
+    if model.clock[transition] == AT:
+        run.row = run.rows[model.first_tick[transition] + k]
+        if model.row >= 0:
+            model.parameters[model.row] = float(run.row)
+
+
+@njit(**INLINE)
+def may_fire(model, run, transition, x, scalar):
+    """Whether the next tick of a clock, which is at this instant, may fire at a state ``x``."""
+    show_row(model, run, transition, number_of_tick(model, run, transition))
+    return allowed(model, transition, run.phase, x, scalar)
+
+
+@njit(**KERNEL)
 def pass_tick(model, run, transition, fires):
     """Count the next tick of a clock as over; ``fires`` if it has fired the transition."""
     own, clock = model.tick_of[transition], model.clock_of[transition]
@@ -187,7 +212,7 @@ def ticking(model, run, work):
     first, last, fires = model.first_clock[run.mode], model.first_clock[run.mode + 1], NO_TRANSITION
     for slot in range(first, last):
         transition = model.clocks[slot]
-        if ticks_now(model, run, transition) and allowed(model, transition, run.phase, run.y, work.scalar):
+        if ticks_now(model, run, transition) and may_fire(model, run, transition, run.y, work.scalar):
             last, fires = slot, transition
             break
     for slot in range(first, last):
@@ -205,17 +230,17 @@ def turned_to(model, run, fired, x_minus, scalar):
     Of two conditions exactly one held before the jump at the state ``x_minus``, and exactly the other one
     holds after it: they choose one of two transitions, and the reset of the first has made both fire.
     """
-    mode, t = run.mode, run.phase
+    mode = run.mode
     # Where the mode is entered anew, its dwell times begin anew.
     restarts = model.clock[fired] == AFTER and model.enters[fired] == 1
-    if restarts or mode != run.previous_mode or allowed(model, fired, t, run.y, scalar):
+    if restarts or mode != run.previous_mode or allowed(model, fired, run.phase, run.y, scalar):
         return NO_TRANSITION
     for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
         other = model.clocks[slot]
         if model.clock_of[other] != model.clock_of[fired] or model.tick_of[other] == model.tick_of[fired]:
             continue
-        if not ticks_now(model, run, other) or allowed(model, other, t, x_minus, scalar):
+        if not ticks_now(model, run, other) or may_fire(model, run, other, x_minus, scalar):
             continue
-        if allowed(model, other, t, run.y, scalar):
+        if may_fire(model, run, other, run.y, scalar):
             return other
     return NO_TRANSITION

@@ -21,6 +21,7 @@ def remember_jump(run, record, transition, transversality, kind, known, x_plus, 
     record.jump_transversality[slot] = transversality
     record.jump_kind[slot] = kind
     record.jump_has_matrix[slot] = 1 if known else 0
+    record.jump_row[slot] = run.row
     for i in range(n):
         record.jump_states[slot, 0, i] = run.y[i]
         record.jump_states[slot, 1, i] = x_plus[i]

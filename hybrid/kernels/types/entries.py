@@ -38,6 +38,7 @@ COUNTERS = (
     "entry_cycle",
     "turned",
     "turned_to",
+    "row",
     "clear",
     "distant",
     "crossings",

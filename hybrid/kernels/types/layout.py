@@ -112,7 +112,8 @@ class Model(Structure):
     The times at which tables in mode ``m`` have their points, which end steps, come in the groups
     ``first_group[m]`` to ``first_group[m + 1]``: ``knots[first_knot[g]:first_knot[g + 1]]``, which come again
     after ``repeat[g]`` unless that is 0. ``before_knots`` are the last times certainly before them.
-    ``parameters`` go on behind the parameters themselves: there the numbers of the tables are.
+    ``parameters`` go on behind the parameters themselves: there the numbers of the tables are. Before them,
+    at ``row``, functions read which row of a schedule fires; -1 if none asks.
     """
 
     field: VECTOR_FUNCTION
@@ -151,6 +152,7 @@ class Model(Structure):
     paired: INDICES
     marker: INDICES
     clock: INDICES
+    row: INTEGER
     first_clock: INDICES
     clocks: INDICES
     first_tick: INDICES
@@ -236,7 +238,9 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
       (transitions,)``: on how many steps the crossings of each guard are not proved.
     - ``tick (transitions,)``: the number of the next tick of each transition; ``ticked (transitions,)``: that
       of the first tick of a clock that has not fired anything yet. ``ticks`` are the numbers of all
-      clocks, those of a transition from ``model.first_tick`` on: period and offset, or times, or a duration.
+      clocks, those of a transition from ``model.first_tick`` on: period and offset, or times in order, or a
+      duration. ``rows`` are the places of the times before they were put in order, ``row`` that of the last
+      to fire.
       The mode was entered in the period ``entry_cycle`` at ``entry_phase``, and ``entry_low`` of rounding.
       ``turned``: jumps at ticks that changed which transition of their clock may fire, last to ``turned_to``.
     - ``clear``: 1 if the last jump has left the state clear of all guards but its own, whose sides are in
@@ -278,6 +282,7 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     tick: INDICES
     ticked: INDICES
     ticks: VECTOR
+    rows: INDICES
     first_step: VECTOR
     stay: VECTOR
     scale: VECTOR
@@ -348,7 +353,7 @@ class Record(
     step_time=("step_phase", "step_low", "step_length"),
     step_place=("step_cycle", "step_mode", "step_jumps"),
     jump_time=("jump_phase", "jump_low", "jump_transversality"),
-    jump_place=("jump_cycle", "jump_transition", "jump_kind", "jump_has_matrix"),
+    jump_place=("jump_cycle", "jump_transition", "jump_kind", "jump_has_matrix", "jump_row"),
     grazing_time=("grazing_phase", "grazing_value", "grazing_acceleration"),
     grazing_place=("grazing_cycle", "grazing_transition", "grazing_jumps"),
 ):
@@ -360,7 +365,8 @@ class Record(
       number of jumps before it; polynomials ``(d + 1, n + 1)`` in a variable on [0, 1], of the state and of
       the time since the start.
     - A jump: its phase and cycle, the transition, its transversality and kind, the states ``(2, n)`` before
-      and after, and whether its saltation matrix ``(n, n)`` is recorded. The matrices follow in order.
+      and after, whether its saltation matrix ``(n, n)`` is recorded, and the row of a schedule that fired
+      last. The matrices follow in order.
     - A grazing: its phase and cycle, the transition, the number of jumps before it, the guard's value and
       acceleration, and the state.
     """

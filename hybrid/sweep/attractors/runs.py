@@ -74,7 +74,8 @@ class Runs:
         if not len(origins) or CTRL_C.is_set():
             return
         plan, count = self.plan, min(len(origins), TOGETHER)
-        memories, phase0 = berths(plan, self.model, count, origins[0], self.setup.t0)
+        model = self.compiled.own(self.model)
+        memories, phase0 = berths(plan, model, count, origins[0], self.setup.t0)
         queue = np.zeros(1, dtype=np.int64)
         starts = [starts_of(each, origins, queue, named=self.named, found=found) for each in memories]
         progress = self.progress(int(memories[0].run.cycle), phase0)
@@ -87,7 +88,7 @@ class Runs:
             for _ in memories
         ]
         jobs = [common.replace(starts=one, progress=own) for one, own in zip(starts, of_each, strict=True)]
-        tasks = [each.task(self.model, orthonormal=False) for each in memories]
+        tasks = [each.task(model, orthonormal=False) for each in memories]
         crew = Crew(together(self.compiled, plan, 0), plan, tasks, jobs)
         crew.memory.max_steps[:] = self.setup.solver.max_steps
         onward = load_kernels("hybrid.kernels.runs.settle").settle

@@ -11,6 +11,7 @@ from models.one_impact import one_impact_orbits
 from tests.hybrid.arguments.values import (
     BALL,
     COUNT,
+    LIST,
     NAME,
     NOT_NEGATIVE,
     NUMBER,
@@ -84,7 +85,8 @@ def checks():
 
 def laws():
     return [
-        (call(models.dosing_schedule), {"times": [*QUANTITY[:-2], [], [2.0, 1.0], [math.nan]]}),
+        (call(models.dosing_schedule), {"times": [*QUANTITY[:-2], [], [math.nan]]}),
+        (call(models.infusion_schedule), {"frame": [*LIST, [], {"t": []}]}),
         (call(models.vibroimpact), {"contact": ["a", 3, 0, False, contact.Rigid, Odd()]}),
         (
             call(contact.hertz_stiffness),

@@ -29,6 +29,9 @@ BAD_STATES = [
     None, "qv", 0, -1, 1.5, True, (), ("1q",), (1, 2), math.nan, 2**70,
     [["q", "v"], ["w"]], np.array(["q"])[:, None],
 ]  # fmt: skip
+# Plain numbers have neither.
+DATED = {"unit": [3, True, "h", Odd()], "origin": [3, True, "2024-01-31", Odd()]}
+COLUMNS = [3, "a", [1.0], {"a": [1.0]}, {"a": 1.0}, Odd()]
 MEMORY = [None, "u", 1, True, ("1u",), ("u", "u"), (1,), {"u"}, [["u"]], Odd()]
 
 
@@ -49,6 +52,7 @@ def systems():
                 "x": [*NUMBERS, [0.0], [1.0, 0.0], [0.0, 0.0], [0.0, math.inf], [[0.0, 1.0]]],
                 "y": [*NUMBERS, [2.0], [2.0, math.nan], [[2.0, 3.0]]],
                 "kind": [None, 3, "spline", ["linear"], Odd()],
+                **DATED,
             },
         ),
         (call(hybrid.Table.__call__, hybrid.Table([0.0, 1.0], [2.0, 3.0]), 0.5), {"u": NUMBERS}),
@@ -160,7 +164,10 @@ def systems():
             },
         ),
         (call(Every, 1.0), {"period": QUANTITY, "offset": [*QUANTITY[:-2], math.inf], "when": FUNCTION}),
-        (call(At, [1.0, 2.0]), {"times": [*QUANTITY[:-2], [], [2.0, 1.0], [math.nan]], "when": FUNCTION}),
+        (
+            call(At, [1.0, 2.0]),
+            {"times": [*QUANTITY[:-2], [], [math.nan]], "when": FUNCTION, "columns": COLUMNS, **DATED},
+        ),
         (call(After, 1.0), {"duration": QUANTITY, "when": FUNCTION}),
         (call(Reset, lambda t, x, p: x), {"function": [None, *FUNCTION], "jacobian": FUNCTION}),
         (

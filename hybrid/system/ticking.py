@@ -1,0 +1,33 @@
+"""The numbers of all clocks of a system, as kernels get them at the start of a run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid.errors import ArgumentError
+from hybrid.system.clocks import fault_of, numbers_of, ticks_of
+from hybrid.system.graph import HybridSystem
+
+
+def put_ticks(
+    system: HybridSystem, x: np.ndarray, parameters: np.ndarray, ticks: np.ndarray, rows: np.ndarray
+) -> None:
+    """Write the numbers of all clocks at a state and parameters, and the rows of schedules, into arrays.
+
+    ArgumentError if a number cannot be.
+    """
+    # The numbers of tables are behind the parameters.
+    own = parameters[: len(system.parameters)].tolist()
+    view, p = system.variables.state_view(x), system.variables.parameter_view(own)
+    for first, transition in zip(system.first_tick, system.transitions, strict=False):
+        clock = transition.clock
+        if clock is not None:
+            numbers, row = ticks_of(clock, view, p)
+            fault = fault_of(clock, numbers)
+            if fault:
+                # In the order in which they were given.
+                fault = fault_of(clock, tuple(map(float, numbers_of(clock, view, p))))
+                owner = f"Transition {transition.name!r}: {type(clock).__name__}"
+                raise ArgumentError(f"{owner}: {fault} with these parameters.")
+            ticks[first : first + len(numbers)] = numbers
+            rows[first : first + len(numbers)] = row
