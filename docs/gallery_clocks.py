@@ -12,6 +12,7 @@ from hybrid.plot import COLOURS
 from models import (
     battery_cell,
     boost_converter,
+    digital_pwm,
     dosing_schedule,
     infusion_schedule,
     refractory_neuron,
@@ -33,6 +34,21 @@ def bifurcations_of_the_boost_converter(axes: Axes) -> None:
         axes.plot(peaks, ticks, ".", color=COLOURS[0], markersize=1.2, markeredgewidth=0.0)
     axes.set_xlabel("peak current I_ref (A)")
     axes.set_ylabel("i at the ticks (A)")
+
+
+def bifurcations_of_the_sampled_duty(axes: Axes) -> None:
+    system = digital_pwm()
+    period = system.parameters["T"]
+    start, mode = np.array([4.0, 0.5]), "on"
+    for k in np.linspace(0.05, 0.4, 351):
+        arc = simulate(system, start, (0.0, 120 * period), mode=mode, parameters={"k": k})
+        start, mode = arc.x[-1], str(arc.mode[-1])
+        samples = [jump.x_minus[0] for jump in arc.jumps["sample"]][-50:]
+        axes.plot(
+            np.full(len(samples), k), samples, ".", color=COLOURS[0], markersize=1.2, markeredgewidth=0.0
+        )
+    axes.set_xlabel("k (1/A)")
+    axes.set_ylabel("i at the samples (A)")
 
 
 def step_of_the_sampled_loop(axes: Axes) -> None:
@@ -98,6 +114,11 @@ PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
         "Current at the ticks over the peak current: a period doubling, borders where ticks find the switch "
         "closed, and chaos.",
         bifurcations_of_the_boost_converter,
+    ),
+    (
+        "digital_pwm",
+        "Current at the samples over the gain: a period doubling, and orbits at the limits of the duty.",
+        bifurcations_of_the_sampled_duty,
     ),
     (
         "sampled_loop",

@@ -9,6 +9,7 @@ from models.bouncing_table import bouncing_table
 from models.buck_converter import buck_converter
 from models.chua_circuit import chua_circuit
 from models.coulomb_stick_slip import coulomb_stick_slip
+from models.digital_pwm import digital_pwm
 from models.dosing_schedule import dosing_schedule
 from models.dry_friction_oscillator import dry_friction_oscillator
 from models.impact_oscillator import impact_oscillator
@@ -37,6 +38,7 @@ __all__ = [
     "buck_converter",
     "chua_circuit",
     "coulomb_stick_slip",
+    "digital_pwm",
     "dosing_schedule",
     "dry_friction_oscillator",
     "impact_oscillator",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -68,8 +69,8 @@ def infusion_schedule(frame: Any = INFUSIONS) -> HybridSystem:
         units={"c": "mg/L", "r": "mg/h", "t": "h", "k": "1/h", "V": "L"},
         modes=[Mode("body", _body)],
         transitions=[
-            Transition("body", "body", begins, _change(begins, 1.0), name="begin"),
-            Transition("body", "body", ends, _change(ends, -1.0), name="end"),
+            Transition("body", "body", begins, Reset(partial(_changed, begins, 1.0)), name="begin"),
+            Transition("body", "body", ends, Reset(partial(_changed, ends, -1.0)), name="end"),
         ],
         laws=Laws(balance={"amount in the body": (_amount, _turnover)}),
     )
@@ -79,8 +80,8 @@ def _body(t, x, p):
     return (x.r / p.V - p.k * x.c,)
 
 
-def _change(schedule, sign):
-    return Reset(lambda t, x, p: {"r": x.r + sign * schedule["rate"]})
+def _changed(schedule, sign, t, x, p):
+    return {"r": x.r + sign * schedule["rate"]}
 
 
 def _amount(t, x, p):

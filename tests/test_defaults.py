@@ -33,7 +33,7 @@ DEFAULTS = {
     hybrid.Tsit5: TOLERANCES,
     hybrid.Every: {"offset": 0.0, "when": None},
     hybrid.At: {"when": None, "unit": None, "origin": None, "columns": None},
-    hybrid.After: {"when": None},
+    hybrid.After: {"when": None, "restarts": True},
     hybrid.Guard: {"direction": 0, "gradient": None, "when": None, "at_start": False},
     hybrid.Mode: {"jacobian": None, "part_of": None},
     hybrid.Reset: {"jacobian": None},

@@ -13,7 +13,7 @@ from hybrid.expression.pieces import Pieces
 from hybrid.expression.values import TraceError, values_of
 from hybrid.expression.vocabulary import WHERE, named
 from hybrid.system.derivatives import complex_step, evaluate, sample_points
-from hybrid.system.functions import CONDITION, GUARD, ModelFunction
+from hybrid.system.functions import GUARD, VALUES_ALONE, ModelFunction
 from hybrid.system.graph import HybridSystem, functions_of
 
 EPSILON = float(np.finfo(float).eps)
@@ -121,7 +121,7 @@ def disagreement(
     opaque = _is_opaque(compiled, function.function)
     signs = function.kind == GUARD and compiled.emitted.plain_guard[index]
     text = _difference(system, function.title, function.value, found, t, x, values, opaque, signs)
-    if text is not None or function.kind == CONDITION:
+    if text is not None or function.kind in VALUES_ALONE:
         return text
     if function.slopes is not None:
         found = compiled.derivative(function, index, t, x, values)

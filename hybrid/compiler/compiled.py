@@ -25,7 +25,7 @@ from hybrid.compiler.traced import key_of
 from hybrid.errors import ArgumentError, ModelError
 from hybrid.kernels.types.codes import DESINGULARISED, NARROW, NO_MODE, ROOTED, RUNGE_KUTTA
 from hybrid.kernels.types.layout import Model, Programs
-from hybrid.system.functions import CLOCK, CONDITION, ModelFunction
+from hybrid.system.functions import CLOCK, CONDITION, NUMBER, ModelFunction
 from hybrid.system.graph import HybridSystem, as_system, functions_of, watched_by
 from hybrid.system.periodicity import period_at, period_fault
 from hybrid.system.watched import Watched
@@ -34,7 +34,9 @@ if TYPE_CHECKING:
     from hybrid.compiler.emitted import Emitted
 
 # The functions of a model as ``hybrid.kernels.evaluate`` numbers them.
-FUNCTION_NUMBERS = {"field": 0, "guard": 1, CLOCK: 1, CONDITION: 1, "reset": 2}
+FUNCTION_NUMBERS = {"field": 0, "guard": 1, CLOCK: 1, CONDITION: 1, NUMBER: 1, "reset": 2}
+# So many times all transitions come before the functions of a kind.
+BEFORE = {CONDITION: 1, NUMBER: 2}
 GRADIENT = 3
 UNBOUNDED = "its forcing cannot be bounded: a pulse in time that is narrower than a step may be stepped over"
 # Threads that meet a new system compile it once; stages of a growing system share what is written.
@@ -120,7 +122,7 @@ class CompiledSystem:
         ``row`` is that of a schedule that fires.
         """
         out = np.full(function.rows, np.nan)
-        offset = len(self.system.transitions) if function.kind == CONDITION else 0
+        offset = BEFORE.get(function.kind, 0) * len(self.system.transitions)
         values = self.with_tables(np.array(parameters, dtype=float), row)
         self._call("vector_function", FUNCTION_NUMBERS[function.kind], index + offset, t, x, values, out)
         return out
@@ -178,7 +180,7 @@ class CompiledSystem:
                 else:
                     transitions = 2 * len(self.system.transitions)
                     # Behind the fields of all modes there are two for a crossing at most.
-                    indices = len(self.system.modes) + transitions
+                    indices = len(self.system.modes) + transitions + len(self.emitted.moving)
                     self.parts[part] = compiled_stage(self.emitted, part, growth.written, indices)
         found: dict[str, Any] = self.parts[part]
         return found

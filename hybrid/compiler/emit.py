@@ -36,7 +36,7 @@ from hybrid.compiler.places import placed, places_of
 from hybrid.compiler.propagators.choice import propagator
 from hybrid.compiler.propagators.equations import Boundary, known_positive
 from hybrid.compiler.readers import is_free, readers
-from hybrid.compiler.rows import place_of_row, with_place_of_row
+from hybrid.compiler.rows import moving_places, place_of_row, with_place_of_row
 from hybrid.compiler.statements.code import Code, Statement, at, put
 from hybrid.compiler.statements.values import assignments, unprintable
 from hybrid.compiler.steep import fields_at_crossings, steep_at_guards, steep_inside
@@ -65,6 +65,7 @@ from hybrid.system.functions import (
     condition_function,
     field_function,
     guard_function,
+    number_functions,
     reset_function,
 )
 
@@ -98,6 +99,7 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
     guards = [writer.write(guard_function(transition)) for transition in system.transitions]
     conditions = [_written_condition(writer, transition) for transition in system.transitions]
     resets = [_written_reset(writer, system, i) for i in range(len(system.transitions))]
+    numbers = [writer.condition(each) for each in number_functions(system.transitions, system.variables)]
     boundaries = [_boundaries(system, mode.name, guards, writer.symbols) for mode in system.modes]
     propagators = [
         writer.remembered(
@@ -144,7 +146,7 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
             text("jacobian", each, partial(with_time, each.derivative, n)) for each in evaluated
         ],
         "variational_field": [text("variational", each, partial(variational, each, n)) for each in evaluated],
-        "guard": [text("value", each, each.value) for each in (*guards, *conditions)],
+        "guard": [text("value", each, each.value) for each in (*guards, *conditions, *numbers)],
         "guard_gradient": [text("gradient", each, partial(gradient, each.derivative, n)) for each in guards],
         "guard_curvature": [
             text(f"curvature {straight}", each, partial(curvature, expression, straight, symbols))
@@ -192,6 +194,7 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
             symbols,
             tables,
         ),
+        **moving_places(system),
         row=row,
         tables=tables.packed(),
         first_forcing=tuple(accumulate(map(len, pulses), initial=0)),

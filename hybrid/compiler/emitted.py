@@ -175,6 +175,9 @@ class Emitted:
         By mode: how it is best advanced.
     tangent_start, tangent_start_abreast
         The first column of tangent vectors in series, and in those of runs abreast.
+    moving, mover
+        Places of the numbers of clocks that resets may change, among those of all clocks, and the
+        transitions of these clocks.
     row
         Where functions read the row of a schedule that fires, behind the parameters; -1 if none does.
     tables
@@ -212,6 +215,8 @@ class Emitted:
     propagators: tuple[Propagator, ...]
     tangent_start: int
     tangent_start_abreast: int
+    moving: tuple[int, ...] = attrs.field(default=(), metadata=FOR_KERNELS)
+    mover: tuple[int, ...] = attrs.field(default=(), metadata=FOR_KERNELS)
     row: int = -1
     tables: str = ""
     opaque: dict[str, OpaqueFunction] = attrs.field(factory=dict)

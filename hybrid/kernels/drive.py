@@ -9,6 +9,7 @@ from hybrid.kernels.arithmetic.clock import forward, set_clock, time_before, tim
 from hybrid.kernels.arithmetic.tables import knots_passed
 from hybrid.kernels.events.clocks import (
     go_to_tick,
+    is_behind,
     next_tick,
     number_of_tick,
     pass_tick,
@@ -23,6 +24,7 @@ from hybrid.kernels.events.guards import (
     rounding_band,
 )
 from hybrid.kernels.events.onset import BY_SPEED
+from hybrid.kernels.events.renewed import renew
 from hybrid.kernels.limit.go import may_accumulate
 from hybrid.kernels.steps.field.jumps import note_start
 from hybrid.kernels.steps.field.late import is_late
@@ -117,6 +119,9 @@ def jump_at_tick(parts, task, fired):
     # The tick is counted as over.
     k = number_of_tick(model, run, fired) - 1
     show_row(model, run, fired, k)
+    if is_behind(model, run, fired, k):
+        # A reset at this instant has brought the tick about: it happens at the time of that jump.
+        run.locked = 1
     parts.jump(task, fired)
     other = turned_to(model, run, fired, run.stretch, task.work.scalar)
     show_row(model, run, fired, k)
@@ -130,6 +135,8 @@ def enter_mode(parts, task):
     """Begin a stay in a mode: take the side of every guard; returns ``GO_ON``, or why the run ends."""
     model, run, mode = task.model, task.run, task.run.mode
     if not finite(run, model.dimension * (1 + task.tangents)):
+        return NON_FINITE
+    if model.moving.shape[0] > 0 and not renew(model, run, task.work.scalar):
         return NON_FINITE
     if model.clocks.shape[0] > 0:
         wind(model, run)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 
 import attrs
@@ -24,6 +25,8 @@ from hybrid.status import (
     steep_status,
     stuck_status,
 )
+from hybrid.system.clocks import fault_of, numbers_of
+from hybrid.system.entries import enters_itself, whole_mode
 from hybrid.system.functions import guard_function
 from hybrid.system.growth import Unexplored
 
@@ -111,7 +114,7 @@ def has_tangents(trajectory: Trajectory) -> bool:
 
 def _notes(trajectory: Trajectory, code: int) -> list[str]:
     """What is told besides the status, with or without tangent vectors; ``is_plain`` names the reasons."""
-    notes = [*_turned(trajectory), *_miscounted(trajectory), *_held(trajectory)]
+    notes = [*_turned(trajectory), *_restarted(trajectory), *_miscounted(trajectory), *_held(trajectory)]
     notes += _run_dry(trajectory, code)
     return [*notes, *_unproved(trajectory), *_unresolved(trajectory), *_unbounded(trajectory)]
 
@@ -160,6 +163,28 @@ def _turned(trajectory: Trajectory) -> Iterator[str]:
             "meant, write a single one whose reset chooses, with np.where. If both are meant, declare "
             "HybridSystem(listed_order=True)."
         )
+
+
+def _restarted(trajectory: Trajectory) -> Iterator[str]:
+    """A note on clocks that jumps from their mode to itself have begun anew, and that have never fired."""
+    run, system = trajectory.run, trajectory.system
+    clocks = {each.part_of or each.name: each for each in system.transitions if each.clock}
+    for name, transition in clocks.items():
+        clock = transition.clock
+        assert clock is not None
+        if not (clock.counts_from_entry and clock.restarts) or run.fires[system.copies_of(name)].any():
+            continue
+        mode, fires = whole_mode(system, transition.source), Counter[str]()
+        for i, each in enumerate(system.transitions):
+            if enters_itself(system, each) and whole_mode(system, each.source) == mode:
+                fires[each.part_of or each.name] += int(run.fires[i])
+        if fires.total():
+            names = ", ".join(repr(name) for name, count in fires.items() if count)
+            yield (
+                f"The clock After of {name!r} never fired: {counted(fires.total(), 'jump')} of {names} from "
+                f"mode {mode!r} to itself began it anew. If it is to count from the entry from another mode, "
+                "write After(..., restarts=False)."
+            )
 
 
 def _miscounted(trajectory: Trajectory) -> Iterator[str]:
@@ -371,7 +396,7 @@ def _failed(trajectory: Trajectory, code: int) -> Status | None:
             "Check the model, or end the run before: a transition whose target is None ends it at a guard.",
         )
     if code == codes.NON_FINITE:
-        return None
+        return _clock_fault(trajectory)
     emitted, mode = trajectory.compiled.emitted, trajectory.mode
     names = [*trajectory.system.switching.get(mode, ()), emitted.steep_inside[run.mode]]
     names = [*dict.fromkeys(name for name in names if name)]
@@ -392,6 +417,24 @@ def _failed(trajectory: Trajectory, code: int) -> Status | None:
         "If the field is smooth, RadauIIA() takes longer steps. If it is not, as a quotient is where its "
         "denominator vanishes, add a transition to a mode in which the state rests.",
     )
+
+
+def _clock_fault(trajectory: Trajectory) -> Status | None:
+    """Status of a run in which a reset has given a clock a number that it cannot have; else None."""
+    system, x = trajectory.system, trajectory.x
+    view, p = system.variables.state_view(x), system.variables.parameter_view(trajectory.parameters)
+    for transition, moving in zip(system.transitions, system.moving, strict=True):
+        clock = transition.clock
+        if clock is not None and moving:
+            with np.errstate(all="ignore"):
+                fault = fault_of(clock, tuple(map(float, numbers_of(clock, view, p))), moving=True)
+            if fault:
+                return Status(
+                    StatusCode.NON_FINITE,
+                    f"The clock of {transition.name!r} cannot go on {_place(trajectory)}: {fault}.",
+                    "A reset has changed what the clock reads. Limit it there, with np.clip for instance.",
+                )
+    return None
 
 
 def _grows_without_bound(trajectory: Trajectory) -> bool:

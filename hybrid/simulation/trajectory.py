@@ -272,11 +272,9 @@ class Trajectory:
         markers = len(run.side) - len(before.side)
         run.side[markers:], run.on_guard[markers:], run.due[:] = before.side, before.on_guard, 0
         run.tick[markers:], run.ticked[markers:] = before.tick, before.ticked
-        run.entry_cycle, run.entry_phase, run.entry_low = (
-            before.entry_cycle,
-            before.entry_phase,
-            before.entry_low,
-        )
+        for name in ("cycle", "phase", "low"):
+            for begin in ("entry", "arrival"):
+                setattr(run, f"{begin}_{name}", getattr(before, f"{begin}_{name}"))
         run.previous_mode = run.mode
 
     def jacobian(self) -> np.ndarray:

@@ -13,7 +13,7 @@ from hybrid import arguments
 from hybrid.errors import ModelError, shown
 from hybrid.system.portable import Portable
 
-# A number, the name of a parameter, or a function of ``p``.
+# A number, the name of a parameter or of what resets alone change, or a function of ``p``, which has both.
 Quantity = Any
 
 
@@ -37,6 +37,44 @@ def read(quantity: Quantity, p: Any) -> Any:
     return quantity(p) if callable(quantity) else quantity
 
 
+@attrs.frozen(eq=False)
+class Given:
+    """What the quantities of a clock read by name: parameters, and what resets alone change of the state."""
+
+    x: Any
+    p: Any
+
+    def __getattr__(self, name: str) -> Any:
+        held = name not in getattr(self.p, "_fields", (name,)) and name in getattr(self.x, "_fields", ())
+        return getattr(self.x if held else self.p, name)
+
+    def __iter__(self) -> Any:
+        return iter(self.p)
+
+    def __len__(self) -> int:
+        return len(self.p)
+
+    def __getitem__(self, place: Any) -> Any:
+        return self.p[place]
+
+
+@attrs.frozen(eq=False)
+class NumberOf:
+    """One of the numbers of a clock as a function of ``(t, x, p)``."""
+
+    clock: Any
+    place: int
+
+    def __call__(self, t: Any, x: Any, p: Any) -> Any:
+        """The number; it does not depend on time."""
+        return self.clock._numbers(x, p)[self.place]
+
+
+def function_of_number(clock: Clock, place: int) -> NumberOf:
+    """The number of a clock in a place as a function, always the same object."""
+    return clock._functions.setdefault(place, NumberOf(clock, place))
+
+
 def numbers_of(clock: Clock, x: Any, p: Any) -> tuple[Any, ...]:
     """The numbers of a clock at a state and parameters."""
     return clock._numbers(x, p)
@@ -47,9 +85,12 @@ def ticks_of(clock: Clock, x: Any, p: Any) -> tuple[Sequence[float], Any]:
     return clock._ticks(x, p)
 
 
-def fault_of(clock: Clock, numbers: Sequence[float]) -> str:
-    """What is wrong with the numbers of a clock, in words; empty if they are right."""
-    return clock._fault(numbers)
+def fault_of(clock: Clock, numbers: Sequence[float], moving: bool = False) -> str:
+    """What is wrong with the numbers of a clock, in words; empty if they are right.
+
+    Of those that resets change, ``moving``, a duration may be zero or negative: then it is over at once.
+    """
+    return clock._fault(numbers, moving)
 
 
 def in_few_words(quantity: Quantity) -> str:
@@ -85,6 +126,8 @@ class Clock(Portable):
     gradient: ClassVar[None] = None
     at_start: ClassVar[bool] = False
     counts_from_entry: ClassVar[bool] = False
+    # Whether it counts from each entry, or only from one from another mode.
+    restarts: ClassVar[bool] = True
     # The component of the state that is the time since the entry of the mode, if there is one.
     age: ClassVar[int | None] = None
 
@@ -92,6 +135,8 @@ class Clock(Portable):
     function: Callable[..., Any] = attrs.field(
         init=False, eq=False, repr=False, default=attrs.Factory(Since, takes_self=True)
     )
+
+    _functions: dict[int, NumberOf] = attrs.field(init=False, eq=False, repr=False, factory=dict)
 
     def __attrs_post_init__(self) -> None:
         # Numbers that depend on parameters are checked by the run.
@@ -119,8 +164,9 @@ class Clock(Portable):
         raise NotImplementedError
 
     def _numbers(self, x: Any, p: Any) -> tuple[Any, ...]:
-        """The numbers of the clock at a state and parameters; only parameters matter here."""
-        return tuple(read(quantity, p) for quantity in self.quantities)
+        """The numbers of the clock at a state and parameters."""
+        given = Given(x, p)
+        return tuple(read(quantity, given) for quantity in self.quantities)
 
     def _ticks(self, x: Any, p: Any) -> tuple[Sequence[float], Any]:
         """The numbers as kernels get them, and the row of a schedule that each belongs to."""
@@ -134,7 +180,7 @@ class Clock(Portable):
         """Time since the nearest tick, negative before it, at the clock's numbers."""
         raise NotImplementedError
 
-    def _fault(self, numbers: Sequence[float]) -> str:
+    def _fault(self, numbers: Sequence[float], moving: bool = False) -> str:
         """What is wrong with the numbers of the clock, in words; empty if they are right."""
         raise NotImplementedError
 
@@ -149,6 +195,10 @@ def _as_offset(value: Any) -> Quantity:
 
 def _as_duration(value: Any) -> Quantity:
     return as_quantity("After", "duration", value)
+
+
+def _as_restarts(value: Any) -> bool:
+    return arguments.flag("After: restarts", value)
 
 
 def check_when(instance: Any, attribute: attrs.Attribute[Any], value: object) -> None:
@@ -171,7 +221,9 @@ class Every(Clock):
     Parameters
     ----------
     period, offset
-        Numbers in units of time, names of parameters, or functions of ``p``; the period is positive.
+        Numbers in units of time, names of parameters or of what resets alone change (held components,
+        counters), or functions of ``p``, which has both; the period is positive. With an offset that a reset
+        changes, each tick keeps its number ``k``.
     when
         Optional condition ``c(t, x, p)``, as that of a `Guard`: a tick without it is passed over.
 
@@ -208,7 +260,7 @@ class Every(Clock):
         period, offset = numbers
         return t - offset - period * np.floor((t - offset) / period + 0.5)
 
-    def _fault(self, numbers: Sequence[float]) -> str:
+    def _fault(self, numbers: Sequence[float], moving: bool = False) -> str:
         """What is wrong with period and offset."""
         period, offset = numbers
         if not 0.0 < period < math.inf:
@@ -221,21 +273,26 @@ class After(Clock):
     """A clock that ticks once, so long after its mode was entered, in the place of a guard.
 
     The start of a run is an entry. A transition from the mode to itself enters it anew, unless it has no
-    reset and so changes nothing. For derivatives, the time since the entry is one more component of the
-    state, the age; orbits and branches whose points lie in such a mode show it as their last component but
-    for counters.
+    reset and so changes nothing; with ``restarts=False`` it does not count as an entry. For derivatives, the
+    time since the entry is one more component of the state, the age; orbits and branches whose points lie in
+    such a mode show it as their last component but for counters.
 
     Parameters
     ----------
     duration
-        A positive number in units of time, the name of a parameter, or a function of ``p``.
+        A positive number in units of time, the name of a parameter or of what resets alone change (a held
+        component, a counter), or a function of ``p``, which has both. One that a reset makes zero, or shorter
+        than the time that has passed, is over at once.
     when
         Optional condition ``c(t, x, p)``, as that of a `Guard`: a tick without it is passed over.
+    restarts
+        Whether a transition from the mode to itself begins the duration anew, as a watchdog wants it. If
+        False, the clock counts from the entry from another mode, or from the start of the run.
 
     Raises
     ------
     ModelError
-        If the duration is not positive and finite, or ``when`` is not a function.
+        If the duration is not positive and finite, ``when`` is not a function, or ``restarts`` is not a bool.
 
     Examples
     --------
@@ -247,8 +304,13 @@ class After(Clock):
 
     duration: Quantity = attrs.field(converter=_as_duration)
     when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=check_when)
-    number: ClassVar[int] = 3
+    restarts: bool = attrs.field(default=True, kw_only=True, converter=_as_restarts)  # type: ignore[misc]
     counts_from_entry: ClassVar[bool] = True
+
+    @property
+    def number(self) -> int:  # type: ignore[override]
+        """Of those that count from each entry, or from one from another mode."""
+        return 3 if self.restarts else 4
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -264,12 +326,13 @@ class After(Clock):
         """Time since the tick of a mode that was entered at time 0."""
         return t - numbers[0]
 
-    def _fault(self, numbers: Sequence[float]) -> str:
+    def _fault(self, numbers: Sequence[float], moving: bool = False) -> str:
         """What is wrong with the duration."""
         [duration] = numbers
-        return (
-            "" if 0.0 < duration < math.inf else f"duration must be positive and finite; got {duration:.6g}"
-        )
+        if moving:
+            return "" if math.isfinite(duration) else f"duration must be finite; got {duration:.6g}"
+        right = 0.0 < duration < math.inf
+        return "" if right else f"duration must be positive and finite; got {duration:.6g}"
 
 
 @attrs.frozen
@@ -277,6 +340,7 @@ class DerivedClock(Clock):
     """A clock in a system that was made from another one.
 
     ``read(x, p)`` gives its numbers, from a state that may hold what were parameters, or in other units.
+    Those in the places ``moving`` depend on what resets change.
     ``age`` is the component of the state that is the time since the entry of the mode, if there is one.
     """
 
@@ -284,6 +348,7 @@ class DerivedClock(Clock):
     read: Callable[[Any, Any], Sequence[Any]]
     when: Callable[..., Any] | None
     age: int | None = None  # type: ignore[misc]
+    moving: tuple[int, ...] = ()
 
     @property
     def number(self) -> int:  # type: ignore[override]
@@ -294,6 +359,11 @@ class DerivedClock(Clock):
     def counts_from_entry(self) -> bool:  # type: ignore[override]
         """As the original."""
         return self.clock.counts_from_entry
+
+    @property
+    def restarts(self) -> bool:  # type: ignore[override]
+        """As the original."""
+        return self.clock.restarts
 
     @property
     def schedule(self) -> Any:
@@ -322,6 +392,6 @@ class DerivedClock(Clock):
         """Time since the nearest tick."""
         return self.clock._since_tick(t, numbers)
 
-    def _fault(self, numbers: Sequence[float]) -> str:
+    def _fault(self, numbers: Sequence[float], moving: bool = False) -> str:
         """What is wrong with the numbers, in words."""
-        return self.clock._fault(numbers)
+        return self.clock._fault(numbers, moving)

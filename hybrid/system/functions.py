@@ -8,13 +8,18 @@ from typing import Any
 import attrs
 
 from hybrid.errors import ModelError, unknown_name
+from hybrid.system.clocks import function_of_number
 from hybrid.system.elements import Mode, Transition
 from hybrid.system.labels import plain_name
+from hybrid.system.moving import moving_numbers
 from hybrid.system.variables import STATE, Variables
 
 CONDITION = "when"
 GUARD = "guard"
 CLOCK = "clock"
+NUMBER = "number of the clock"
+# Functions without a derivative.
+VALUES_ALONE = (CONDITION, NUMBER)
 
 
 @attrs.frozen
@@ -210,6 +215,18 @@ def guard_function(transition: Transition) -> ModelFunction:
     return ModelFunction(owner, kind, guard.function, "gradient", guard.gradient, None)
 
 
+def number_functions(transitions: Sequence[Transition], variables: Variables) -> list[ModelFunction]:
+    """The numbers of clocks that resets may change, in the order of the transitions."""
+    return [
+        ModelFunction(
+            f"Transition {each.name!r}", NUMBER, function_of_number(each.clock, place), "", None, None
+        )
+        for each in transitions
+        if each.clock
+        for place in moving_numbers(each, variables)
+    ]
+
+
 def condition_function(transition: Transition) -> ModelFunction | None:
     """The condition of a transition's guard; None without a condition."""
     if transition.guard.when is None:
@@ -250,6 +267,7 @@ def functions_in(
     """Every model function with the index of its mode or transition, fields first."""
     for index, mode in enumerate(modes):
         yield index, field_function(mode, variables)
+    yield from enumerate(number_functions(transitions, variables))
     for index, transition in enumerate(transitions):
         yield index, guard_function(transition)
         condition = condition_function(transition)

@@ -29,6 +29,7 @@ from hybrid.system.given import (
 )
 from hybrid.system.growth import Growth
 from hybrid.system.laws import Laws, placed
+from hybrid.system.moving import moving_numbers
 from hybrid.system.outputs import Output, as_outputs, check_outputs
 from hybrid.system.periodicity import Period, period_at
 from hybrid.system.portable import Portable
@@ -274,6 +275,11 @@ class HybridSystem(Portable):
         """By transition: the place of the first number of its clock among those of all, and their count."""
         counts = (0 if each.clock is None else len(each.clock.quantities) for each in self.transitions)
         return tuple(accumulate(counts, initial=0))
+
+    @cached_property
+    def moving(self) -> tuple[tuple[int, ...], ...]:
+        """By transition: the places among the numbers of its clock of those that resets may change."""
+        return tuple(moving_numbers(each, self.variables) for each in self.transitions)
 
     @cached_property
     def aging(self) -> frozenset[str]:

@@ -53,8 +53,9 @@ class At(Clock):
     Parameters
     ----------
     times
-        Times in any order, each a number, the name of a parameter, or a function of ``p``. Times that are
-        parameters may pass each other: their order is found when a run begins.
+        Times in any order, each a number, the name of a parameter or of what resets alone change (a held
+        component, a counter), or a function of ``p``, which has both. Times that are parameters may pass
+        each other: their order is found when a run begins. A time that a reset puts into the past is missed.
     when
         Optional condition ``c(t, x, p)``, as that of a `Guard`: a tick without it is passed over.
     unit
@@ -225,7 +226,7 @@ class At(Clock):
             found = np.where(row == i, numbers[i], found)
         return t - found
 
-    def _fault(self, numbers: Sequence[float]) -> str:
+    def _fault(self, numbers: Sequence[float], moving: bool = False) -> str:
         """What is wrong with the times."""
         bad = np.flatnonzero(~np.isfinite(np.array(numbers, dtype=float)))
         if not bad.size:

@@ -19,14 +19,14 @@ def put_ticks(
     # The numbers of tables are behind the parameters.
     own = parameters[: len(system.parameters)].tolist()
     view, p = system.variables.state_view(x), system.variables.parameter_view(own)
-    for first, transition in zip(system.first_tick, system.transitions, strict=False):
+    for first, transition, moving in zip(system.first_tick, system.transitions, system.moving, strict=False):
         clock = transition.clock
         if clock is not None:
             numbers, row = ticks_of(clock, view, p)
-            fault = fault_of(clock, numbers)
+            fault = fault_of(clock, numbers, bool(moving))
             if fault:
                 # In the order in which they were given.
-                fault = fault_of(clock, tuple(map(float, numbers_of(clock, view, p))))
+                fault = fault_of(clock, tuple(map(float, numbers_of(clock, view, p))), bool(moving))
                 owner = f"Transition {transition.name!r}: {type(clock).__name__}"
                 raise ArgumentError(f"{owner}: {fault} with these parameters.")
             ticks[first : first + len(numbers)] = numbers

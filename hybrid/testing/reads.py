@@ -23,8 +23,8 @@ _PASSED: WeakKeyDictionary[HybridSystem, dict[str, bool]] = WeakKeyDictionary()
 def is_passed(system: HybridSystem, transition: str) -> bool:
     """Whether the state passes the guard of a transition, so that it is no wall.
 
-    It passes a guard of time alone; and one whose reset leads back to the mode and changes something, but
-    nothing of what the guard and its speed are made of, as a counter does.
+    It passes a guard of time alone, as that of `Every`; and one whose reset leads back to the mode and
+    changes something, but nothing of what the guard and its speed are made of, as a counter does.
     """
     found = _PASSED.setdefault(system, {})
     if transition not in found:
@@ -36,6 +36,8 @@ def is_passed(system: HybridSystem, transition: str) -> bool:
 
 
 def _is_passed(system: HybridSystem, transition: Transition) -> bool:
+    if transition.clock is not None and not transition.clock.counts_from_entry:
+        return True
     felt = names_read(system, transition.guard.function) - {TIME}
     if felt.isdisjoint(system.state_names):
         return True

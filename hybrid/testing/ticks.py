@@ -6,12 +6,13 @@ import math
 from itertools import pairwise
 from typing import Any
 
+import attrs
 import numpy as np
 
 from hybrid.simulation.jumps import Jump
 from hybrid.system.clocks import Clock, numbers_of
 from hybrid.system.elements import Transition
-from hybrid.system.entries import enters_anew
+from hybrid.system.entries import enters_anew, enters_itself
 from hybrid.system.schedule import At
 from hybrid.testing.case import Case, as_case, jump_told
 from hybrid.testing.errors import discard
@@ -20,6 +21,15 @@ TICKS = "A clock fires at each of its ticks, once"
 
 # Ticks are known up to the rounding of a few operations with times.
 ROUNDING = 64.0 * float(np.finfo(float).eps)
+
+
+@attrs.define
+class Begins:
+    """When the mode of a run was entered, and when from another mode; the clocks that have fired since."""
+
+    entry: float
+    arrival: float
+    over: set[str] = attrs.field(factory=set)
 
 
 def check_ticks(case: Case) -> None:
@@ -43,38 +53,40 @@ def check_ticks(case: Case) -> None:
     clocks = [each for each in case.system.transitions if each.clock]
     if arc is None or not clocks:
         discard("no transition has a clock" if arc else "no mode allows the start")
-    entry, fired = _start_of_stay(case, case.t0, arc.x[0]), set[tuple[str, int | None]]()
+    age = 0.0 if case.system.age is None else float(arc.x[0][case.system.age])
+    begins, fired = Begins(case.t0 - age, case.t0 - age), set[tuple[str, int | None]]()
     times = [case.t0, *arc.jumps.t.tolist(), float(arc.t[-1])]
     states = [arc.x[0], *arc.jumps.x_plus]
     mode: str | None = str(arc.mode[0])
     for i, (begin, end) in enumerate(pairwise(times)):
         for transition in clocks:
-            if transition.source == mode and transition.guard.when is None:
-                _check_between(case, transition, states[i], entry, begin, end)
+            asked = transition.guard.when is None and transition.name not in begins.over
+            if asked and transition.source == mode:
+                _check_between(case, transition, states[i], begins, begin, end)
         if i == len(arc.jumps):
             break
         jump = arc.jumps[i]
         if end > begin:
             fired.clear()
-        _check_at(case, jump, entry, fired)
-        if enters_anew(case.system, case.transition(jump)):
-            entry = jump.t
+        _check_at(case, jump, begins, begin, fired)
+        transition = case.transition(jump)
+        if enters_anew(case.system, transition):
+            stays = enters_itself(case.system, transition)
+            begins.entry, begins.arrival = jump.t, begins.arrival if stays else jump.t
+            begins.over = {
+                each.name for each in clocks if each.name in begins.over and stays and _is_one(each)
+            }
         mode = jump.target
 
 
-def _start_of_stay(case: Case, t: float, x: np.ndarray) -> float:
-    """When the mode was entered in which a run begins."""
-    return t if case.system.age is None else t - float(x[case.system.age])
-
-
 def _check_between(
-    case: Case, transition: Transition, x: np.ndarray, entry: float, begin: float, end: float
+    case: Case, transition: Transition, x: np.ndarray, begins: Begins, begin: float, end: float
 ) -> None:
     """Fail if a clock ticks between two jumps, by more than rounding away from both."""
     assert transition.clock is not None
     numbers = _numbers(case, transition.clock, x)
     band = _band(numbers, begin, end)
-    tick = _first_behind(transition.clock, numbers, entry, begin + band)
+    tick = _first_from(transition.clock, numbers, begins, begin, band)
     if tick < end - band:
         case.fail(
             TICKS,
@@ -84,19 +96,33 @@ def _check_between(
         )
 
 
-def _check_at(case: Case, jump: Jump, entry: float, fired: set[tuple[str, int | None]]) -> None:
-    """Fail if a jump of a clock is at no tick, or has ``fired`` before at this instant."""
+def _is_one(transition: Transition) -> bool:
+    """Whether a clock ticks once from an entry from another mode on."""
+    return transition.clock is not None and not transition.clock.restarts
+
+
+def _check_at(
+    case: Case, jump: Jump, begins: Begins, before: float, fired: set[tuple[str, int | None]]
+) -> None:
+    """Fail if a jump of a clock is at no tick, or has ``fired`` before at this instant.
+
+    The jump before was at the time ``before``.
+    """
     clock = case.transition(jump).clock
     if clock is None:
         return
     numbers = _numbers(case, clock, jump.x_minus)
-    band = _band(numbers, entry, jump.t)
-    tick = _first_behind(clock, numbers, entry, jump.t - band)
+    band = _band(numbers, jump.t)
+    tick = _first_from(
+        clock, numbers, begins, before if clock.counts_from_entry else jump.t - 2.0 * band, band
+    )
     if not abs(tick - jump.t) <= band:
         case.fail(TICKS, jump_told(case, jump), f"the next tick is at t = {tick:.10g}", hint="it is early.")
     if (jump.transition, jump.row) in fired:
         case.fail(TICKS, jump_told(case, jump), "it has fired at this instant", hint="a tick fires twice.")
     fired.add((jump.transition, jump.row))
+    if clock.counts_from_entry:
+        begins.over.add(jump.transition)
 
 
 def _numbers(case: Case, clock: Clock, x: np.ndarray) -> np.ndarray:
@@ -108,11 +134,14 @@ def _band(numbers: np.ndarray, *times: float) -> float:
     return ROUNDING * float(np.abs([*numbers, *times]).max())
 
 
-def _first_behind(clock: Any, numbers: np.ndarray, entry: float, t: float) -> float:
-    """The first tick of a clock behind a time; infinite if there is none."""
+def _first_from(clock: Any, numbers: np.ndarray, begins: Begins, t: float, band: float) -> float:
+    """The first tick of a clock behind ``t + band``; infinite if there is none.
+
+    A duration that a reset has made shorter than the time that has passed is over at once, at ``t``.
+    """
     if clock.counts_from_entry:
-        tick = entry + float(numbers[0])
-        return tick if tick > t else math.inf
+        return max(t, (begins.entry if clock.restarts else begins.arrival) + float(numbers[0]))
+    t += band
     if clock.number == At.number:
         return float(np.min(numbers[numbers > t], initial=math.inf))
     period, offset = numbers

@@ -16,6 +16,7 @@ from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem
 from hybrid.system.laws import Laws
+from hybrid.system.moving import moving_numbers
 from hybrid.system.variables import PARAMETERS, STATE, named_values
 from hybrid.testing.case import Case, as_case
 from hybrid.testing.errors import discard
@@ -166,10 +167,11 @@ def _measured(system: HybridSystem) -> Measured:
             declared = declared(named_values(PARAMETERS, names, p[: len(names)]))
         return getattr(p, time) * declared
 
-    def slower(clock: Clock) -> Callable[..., Any]:
+    def slower(clock: Clock, mode: str) -> Callable[..., Any]:
+        own = original(lambda t, x, p: numbers_of(clock, x, p), mode)
+
         def numbers(x: Any, p: Any) -> list[Any]:
-            own = numbers_of(clock, x, named_values(PARAMETERS, names, p[: len(names)]))
-            return [getattr(p, time) * number for number in own]
+            return [getattr(p, time) * number for number in own(0.0, x, p)]
 
         return numbers
 
@@ -177,7 +179,8 @@ def _measured(system: HybridSystem) -> Measured:
         own, when = transition.guard, transition.guard.when
         if isinstance(own, Clock):
             asked = None if when is None else original(when, transition.source)
-            return DerivedClock(own, slower(own), asked, own.age)
+            moving = moving_numbers(transition, system.variables)
+            return DerivedClock(own, slower(own, transition.source), asked, own.age, moving)
         return Guard(
             original(own.function, transition.source),
             own.direction,

@@ -16,10 +16,11 @@ import numpy as np
 
 from hybrid.system.clocks import Clock, DerivedClock, numbers_of
 from hybrid.system.elements import Guard, Mode, Reset, Transition
-from hybrid.system.entries import enters_anew, has_age
+from hybrid.system.entries import begins_age, check_ages, has_age
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem, watched_below
 from hybrid.system.growth import Growth
+from hybrid.system.moving import moving_numbers
 from hybrid.system.portable import made_by
 from hybrid.system.variables import STATE, named_values
 
@@ -30,11 +31,12 @@ def aged(system: HybridSystem) -> HybridSystem:
     """The system with the age, last of what has tangent vectors; itself if no clock counts from an entry.
 
     The age moves at the rate 1 in modes whose clocks count from the entry. It is zero in all others, and
-    after each jump that enters a mode. The component is an ordinary one, so that saltation matrices, orbits
-    and sensitivities need no rule for it. Held components become ones with the rate 0 before it.
+    after each jump from which they count. The component is an ordinary one, so that saltation matrices,
+    orbits and sensitivities need no rule for it. Held components become ones with the rate 0 before it.
     """
     if system.age is not None or not system.aging:
         return system
+    check_ages(system)
     if system._aged is None or not system._aged.derived_from.holds():
         made = made_by(_Aging(system).system(), aged, system)
         object.__setattr__(system, "_aged", made)
@@ -102,10 +104,11 @@ class _Aging:
         moved: Guard | Clock
         if isinstance(guard, Clock):
             read = self._without_time(guard)
-            moved = DerivedClock(guard, read, when, age if guard.counts_from_entry else None)
+            moving = moving_numbers(transition, self.original.variables)
+            moved = DerivedClock(guard, read, when, age if guard.counts_from_entry else None, moving)
         else:
             moved = Guard(self._function(guard.function), guard.direction, when=when, at_start=guard.at_start)
-        reset, enters = transition.reset, enters_anew(self.original, transition)
+        reset, enters = transition.reset, begins_age(self.original, transition)
         if reset is None and not enters:
             return attrs.evolve(transition, guard=moved)
         values = None

@@ -40,6 +40,7 @@ from hybrid.system.clocks import Clock, DerivedClock, numbers_of
 from hybrid.system.elements import Guard, Reset, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem, watched_below
+from hybrid.system.moving import moving_numbers
 from hybrid.system.variables import STATE, named_values
 
 # Functions that jump, in terms of the two that count: a floor and a comparison.
@@ -256,7 +257,8 @@ class _Counting:
             def numbers(x: Any, p: Any, clock: Clock = guard) -> tuple[Any, ...]:
                 return numbers_of(clock, self._own(x), p)
 
-            moved = DerivedClock(guard, numbers, when, guard.age)
+            moving = moving_numbers(transition, self.original.variables)
+            moved = DerivedClock(guard, numbers, when, guard.age, moving)
         else:
             moved = Guard(self._function(guard.function), guard.direction, when=when, at_start=guard.at_start)
         entered = transition.target in own and transition.target != transition.source

@@ -16,6 +16,7 @@ from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeField, WholeReset
 from hybrid.system.graph import HybridSystem, watched_below
 from hybrid.system.laws import Laws
+from hybrid.system.moving import moving_numbers
 from hybrid.system.portable import made_by
 from hybrid.system.variables import PARAMETERS, STATE, named_values
 
@@ -94,7 +95,8 @@ class _Extension:
             def numbers(x: Any, p: Any, clock: Clock = guard) -> tuple[Any, ...]:
                 return numbers_of(clock, self._own(x), self._all_parameters(x, p))
 
-            moved = DerivedClock(guard, numbers, when, guard.age)
+            moving = moving_numbers(transition, self.original.variables)
+            moved = DerivedClock(guard, numbers, when, guard.age, moving)
         else:
             moved = Guard(self._function(guard.function), guard.direction, when=when, at_start=guard.at_start)
         return attrs.evolve(transition, guard=moved, reset=new)

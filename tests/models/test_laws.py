@@ -57,6 +57,14 @@ RUNS = {
         {"states": {"x": (-2.0, 2.0), "y": (-0.3, 0.3), "z": (-2.0, 2.0)}, "t_span": (0.0, 6.0)},
     ),
     "coulomb_stick_slip": (models.coulomb_stick_slip(), {"t_span": (0.0, 15.0)}),
+    "digital_pwm": (
+        models.digital_pwm(),
+        {
+            "states": {"i": (3.0, 6.0), "d": (0.3, 0.7)},
+            "parameters": {"k": (0.05, 0.1)},
+            "t_span": (0.0, 2e-3),
+        },
+    ),
     "dosing_schedule": (
         models.dosing_schedule(),
         {"states": {"A": (0.0, 100.0), "c": (0.0, 3.0)}, "t_span": (0.0, 40.0)},
@@ -157,6 +165,7 @@ MORE_UNCHECKED = {
     "battery_cell": {FLOW_DIRECTION},
     # The age that tangent vectors need has no unit.
     "refractory_neuron": {DIMENSIONS},
+    "digital_pwm": {CROSSINGS, CUT, DIMENSIONS, SUM_RULE},
 }
 # Few starts lead to these; a belt carries a block away from where it would slip ahead.
 RARE = {

@@ -26,6 +26,14 @@ from hybrid.kernels.types.options import INLINE, KERNEL
 ROUNDING_OF_TICK = 2 * EPSILON
 
 
+@njit(**INLINE)
+def begin_of_count(model, run, transition):
+    """The period, the phase, and its rounding, from which a clock counts that begins with its mode."""
+    if model.clock[transition] == AFTER:
+        return run.entry_cycle, run.entry_phase, run.entry_low
+    return run.arrival_cycle, run.arrival_phase, run.arrival_low
+
+
 @njit(**IN_ORDER)
 def place_of_tick(model, run, transition, k):
     """Time of tick ``k`` from the start of the current period, in two parts; infinite after the last one."""
@@ -40,8 +48,8 @@ def place_of_tick(model, run, transition, k):
     elif kind == AT:
         more = run.ticks[first + k]
     else:
-        cycles += run.entry_cycle
-        high, low, more = run.entry_phase, run.entry_low, run.ticks[first]
+        begin, high, low = begin_of_count(model, run, transition)
+        cycles, more = cycles + begin, run.ticks[first]
     whole, rest = product_in_two_parts(float(cycles), model.period)
     total, lost = sum_in_two_parts(high, whole)
     total, more_lost = sum_in_two_parts(total, more)
@@ -66,8 +74,8 @@ def rounding_of_tick(model, run, transition, k):
         return ROUNDING_OF_TICK * (abs(k * run.ticks[first]) + abs(run.ticks[first + 1]))
     if kind == AT:
         return ROUNDING_OF_TICK * abs(run.ticks[first + min(k, model.first_tick[transition + 1] - first - 1)])
-    entry = run.entry_cycle * model.period + run.entry_phase
-    return ROUNDING_OF_TICK * (abs(entry) + run.ticks[first])
+    begin, phase, _ = begin_of_count(model, run, transition)
+    return ROUNDING_OF_TICK * (abs(begin * model.period + phase) + run.ticks[first])
 
 
 @njit(**KERNEL)
@@ -105,12 +113,18 @@ def leads_to_part(model, transition):
 
 
 @njit(**IN_ORDER)
-def keep_entry(model, run):
-    """Keep the time at which the mode has been entered: now, or as long ago as the state says."""
+def keep_entry(model, run, arrives):
+    """Keep the time at which the mode has been entered: now, or as long ago as the state says.
+
+    The run ``arrives`` if it comes from another mode, or starts.
+    """
     run.entry_cycle, run.entry_phase, run.entry_low = run.cycle, run.phase, run.phase_low
     if model.age >= 0:
         run.entry_phase, lost = sum_in_two_parts(run.phase, -run.y[model.age])
         run.entry_low += lost
+    if arrives:
+        run.arrival_cycle, run.arrival_phase = run.entry_cycle, run.entry_phase
+        run.arrival_low = run.entry_low
 
 
 @njit(**KERNEL)
@@ -123,15 +137,16 @@ def wind(model, run):
     that ends there.
     """
     mode, starts = run.mode, run.last_fired == NO_TRANSITION
-    entered = starts or model.enters[run.last_fired] == 1
     moved = not starts and model.whole_mode[run.previous_mode] != model.whole_mode[mode]
+    entered = starts or moved or model.enters[run.last_fired] == 1
     if entered:
-        keep_entry(model, run)
+        keep_entry(model, run, starts or moved)
     for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
         transition = model.clocks[slot]
         own = model.tick_of[transition]
-        if model.clock[transition] == AFTER:
-            run.tick[own] = 0 if entered else run.tick[own]
+        if model.clock[transition] >= AFTER:
+            begins = entered if model.clock[transition] == AFTER else starts or moved
+            run.tick[own] = 0 if begins else run.tick[own]
             continue
         ahead = starts and not leads_to_part(model, transition)
         run.tick[own] = max(run.tick[own], first_from(model, run, transition, ahead))

@@ -44,8 +44,9 @@ BY_NOTHING, BY_FLOW, BY_GUARD = range(3)
 # Target of a transition that ends the run, and limit of a chatter that names none.
 NO_MODE = -1
 
-# Kinds of clocks, as ``hybrid.system.clocks`` numbers them; 0 for a guard.
-EVERY, AT, AFTER = range(1, 4)
+# Kinds of clocks, as ``hybrid.system.clocks`` numbers them; 0 for a guard. An arrival is an entry from
+# another mode.
+EVERY, AT, AFTER, AFTER_ARRIVAL = range(1, 5)
 # Number of the next tick of a clock that has not been wound up yet.
 FIRST_TICK = -(2**62)
 

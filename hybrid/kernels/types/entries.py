@@ -36,6 +36,7 @@ COUNTERS = (
     "field_jumps",
     "jumped_in",
     "entry_cycle",
+    "arrival_cycle",
     "turned",
     "turned_to",
     "row",
@@ -71,4 +72,6 @@ NUMBERS = (
     "stretch_left",
     "entry_phase",
     "entry_low",
+    "arrival_phase",
+    "arrival_low",
 )

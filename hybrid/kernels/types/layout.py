@@ -75,7 +75,9 @@ class Model(Structure):
     Of the ``dimension`` components of the state the first ``controlled`` have tangent vectors and tolerances;
     the others are counters, and exact. Component ``age`` is the time since the mode was entered; -1 for none.
     ``guard(i, ...)`` is the guard of transition ``i`` and ``guard(i + transitions, ...)`` its condition,
-    which leaves ``out`` alone if there is none. ``outgoing[first_outgoing[m]:first_outgoing[m + 1]]`` are the
+    which leaves ``out`` alone if there is none. Behind all conditions come the numbers of clocks that resets
+    may change: they are ``run.ticks[moving]``, and belong to the transitions ``mover``.
+    ``outgoing[first_outgoing[m]:first_outgoing[m + 1]]`` are the
     transitions that leave mode ``m``, in the order they were listed, but for those that only a start fires:
     these are in ``at_start[first_at_start[m]:first_at_start[m + 1]]``. ``target`` is -1 for one that ends the
     run. ``affine_guard`` is 1 for a guard that is affine in state and time, ``guard_in_series`` for one that
@@ -153,6 +155,8 @@ class Model(Structure):
     marker: INDICES
     clock: INDICES
     row: INTEGER
+    moving: INDICES
+    mover: INDICES
     first_clock: INDICES
     clocks: INDICES
     first_tick: INDICES
@@ -241,7 +245,8 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
       clocks, those of a transition from ``model.first_tick`` on: period and offset, or times in order, or a
       duration. ``rows`` are the places of the times before they were put in order, ``row`` that of the last
       to fire.
-      The mode was entered in the period ``entry_cycle`` at ``entry_phase``, and ``entry_low`` of rounding.
+      The mode was entered in the period ``entry_cycle`` at ``entry_phase``, and ``entry_low`` of rounding;
+      the same three numbers of the ``arrival`` tell when it was entered from another mode.
       ``turned``: jumps at ticks that changed which transition of their clock may fire, last to ``turned_to``.
     - ``clear``: 1 if the last jump has left the state clear of all guards but its own, whose sides are in
       ``tried_side``. ``distant``: 1 if the last step has proved that all guards are far from zero at its end;

@@ -4,7 +4,7 @@ Nothing here needs the compiler: the function is a kernel for runs from many sta
 single run.
 """
 
-from hybrid.kernels.types.codes import HELD, RUNGE_KUTTA
+from hybrid.kernels.types.codes import AFTER, HELD, RUNGE_KUTTA
 
 # The rounding of the time may be worth so many tolerances in one step: it is measured between neighbouring
 # numbers, which are a few times as far apart as the time is from the nearest.
@@ -29,6 +29,19 @@ def is_plain(model, run, beyond):
         if run.y[i] % 1.0 != 0.0:
             return False
     for mode in range(model.bounded.shape[0]):
+        waiting, begun = 0, 0
+        for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
+            each = model.clocks[slot]
+            waiting += model.clock[each] == AFTER and run.fires[each] == 0
+            own = model.target[each] == mode and model.enters[each] == 1
+            begun += run.fires[each] if own else 0
+        for slot in range(model.first_outgoing[mode], model.first_outgoing[mode + 1]):
+            each = model.outgoing[slot]
+            own = model.target[each] == mode and model.enters[each] == 1
+            begun += run.fires[each] if own else 0
+        # A clock that jumps from its mode to itself have begun anew has not fired.
+        if waiting > 0 and begun > 0:
+            return False
         if model.bounded[mode] == 0 and (mode == run.mode or run.stay[mode] > 0.0):
             return False
     may_run_dry = model.steep[run.mode] == 1 and model.propagator[run.mode] == RUNGE_KUTTA

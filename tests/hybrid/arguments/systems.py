@@ -168,7 +168,7 @@ def systems():
             call(At, [1.0, 2.0]),
             {"times": [*QUANTITY[:-2], [], [math.nan]], "when": FUNCTION, "columns": COLUMNS, **DATED},
         ),
-        (call(After, 1.0), {"duration": QUANTITY, "when": FUNCTION}),
+        (call(After, 1.0), {"duration": QUANTITY, "when": FUNCTION, "restarts": FLAG}),
         (call(Reset, lambda t, x, p: x), {"function": [None, *FUNCTION], "jacobian": FUNCTION}),
         (
             call(Transition, "a", "a", Guard(lambda t, x, p: x.q)),

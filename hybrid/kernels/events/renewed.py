@@ -1,0 +1,78 @@
+"""Clocks whose numbers resets change: a held duration, a due time. They are read again at each entry."""
+
+import math
+
+from numba import njit
+
+from hybrid.kernels.events.clocks import first_from, is_behind
+from hybrid.kernels.types.codes import AT, EVERY, FIRST_TICK, NO_TRANSITION
+from hybrid.kernels.types.options import KERNEL
+
+
+@njit(**KERNEL)
+def renew(model, run, scalar):
+    """Read the numbers of clocks that resets may change; whether all are numbers that a clock can have."""
+    first_number = 2 * model.target.shape[0]
+    for i in range(model.moving.shape[0]):
+        place, transition = model.moving[i], model.mover[i]
+        model.guard(first_number + i, run.phase, run.y, model.parameters, scalar)
+        number, kind, first = scalar[0], model.clock[transition], model.first_tick[transition]
+        if not abs(number) < math.inf or (kind == EVERY and place == first and not number > 0.0):
+            return False
+        if kind == AT:
+            put_time(model, run, transition, place - first, number)
+        elif number != run.ticks[place] and kind == EVERY:
+            put_number(model, run, transition, place, number)
+        else:
+            run.ticks[place] = number
+    return True
+
+
+@njit(**KERNEL)
+def put_number(model, run, transition, place, number):
+    """Change the period or the offset of a clock.
+
+    With another offset each tick keeps its number, so those that are over stay over: a duty of 1 that is set
+    where a period begins ends the period that begins there. With another period ticks are counted anew; one
+    that has just fired is over.
+    """
+    own, starts = model.tick_of[transition], run.last_fired == NO_TRANSITION
+    if place > model.first_tick[transition]:
+        if not starts:
+            run.tick[own] = max(run.tick[own], first_from(model, run, transition, False))
+        run.ticks[place] = number
+        return
+    run.ticks[place] = number
+    run.ticked[model.clock_of[transition]] = run.tick[own] = FIRST_TICK
+    if not starts:
+        run.tick[own] = first_from(model, run, transition, model.tick_of[run.last_fired] == own)
+
+
+@njit(**KERNEL)
+def put_time(model, run, transition, row, time):
+    """Put the time of a row of a schedule in order; a time that has passed is over, any other is ahead."""
+    first, own = model.first_tick[transition], model.tick_of[transition]
+    last = model.first_tick[transition + 1] - first - 1
+    k = 0
+    while run.rows[first + k] != row:
+        k += 1
+    if run.ticks[first + k] == time:
+        return
+    passed = min(max(run.tick[own], 0), last + 1)
+    if k < passed:
+        passed -= 1
+    for j in range(first + k, first + last):
+        run.ticks[j], run.rows[j] = run.ticks[j + 1], run.rows[j + 1]
+    run.ticks[first + last] = time
+    over = is_behind(model, run, transition, last)
+    place, least = last, 0 if over else passed
+    while place > least and run.ticks[first + place - 1] > time:
+        run.ticks[first + place] = run.ticks[first + place - 1]
+        run.rows[first + place] = run.rows[first + place - 1]
+        place -= 1
+    run.ticks[first + place], run.rows[first + place] = time, row
+    if over and place <= passed:
+        passed += 1
+    if run.last_fired != NO_TRANSITION:
+        run.tick[own] = passed
+    run.ticked[model.clock_of[transition]] = FIRST_TICK
