@@ -53,7 +53,10 @@ def digital_pwm() -> HybridSystem:
         state=("i",),
         held=("d",),
         parameters={"V": 24.0, "R": 2.0, "L": 1e-3, "T": 5e-4, "ref": 5.0, "k": 0.1, "d_0": 0.45},
-        units={"i": "A", "t": "s", "V": "V", "R": "ohm", "L": "H", "T": "s", "ref": "A", "k": "1/A"},
+        units={
+            "i": "A", "d": "", "t": "s", "V": "V", "R": "ohm", "L": "H", "T": "s", "ref": "A", "k": "1/A",
+            "d_0": "",
+        },
         modes=[Mode("on", _on), Mode("off", _off)],
         transitions=[
             Transition("off", "on", Every("T"), Reset(_sampled), name="sample"),
@@ -62,7 +65,7 @@ def digital_pwm() -> HybridSystem:
         start="off",
         period=_period,
         laws=Laws(invariant={"room of the duty": _room}, across={"switch off": {"continuity": _switched}}),
-    )
+    )  # fmt: skip
 
 
 def _on(t, x, p):

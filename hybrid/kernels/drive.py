@@ -9,7 +9,6 @@ from hybrid.kernels.arithmetic.clock import forward, set_clock, time_before, tim
 from hybrid.kernels.arithmetic.tables import knots_passed
 from hybrid.kernels.events.clocks import (
     go_to_tick,
-    is_behind,
     next_tick,
     number_of_tick,
     pass_tick,
@@ -24,7 +23,7 @@ from hybrid.kernels.events.guards import (
     rounding_band,
 )
 from hybrid.kernels.events.onset import BY_SPEED
-from hybrid.kernels.events.renewed import renew
+from hybrid.kernels.events.renewed import is_cut_short, renew
 from hybrid.kernels.limit.go import may_accumulate
 from hybrid.kernels.steps.field.jumps import note_start
 from hybrid.kernels.steps.field.late import is_late
@@ -119,8 +118,8 @@ def jump_at_tick(parts, task, fired):
     # The tick is counted as over.
     k = number_of_tick(model, run, fired) - 1
     show_row(model, run, fired, k)
-    if is_behind(model, run, fired, k):
-        # A reset at this instant has brought the tick about: it happens at the time of that jump.
+    if is_cut_short(model, run, fired, k):
+        # It happens at the time of the jump that has cut it short.
         run.locked = 1
     parts.jump(task, fired)
     other = turned_to(model, run, fired, run.stretch, task.work.scalar)

@@ -5,7 +5,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.events.clocks import first_from, is_behind
-from hybrid.kernels.types.codes import AT, EVERY, FIRST_TICK, NO_TRANSITION
+from hybrid.kernels.types.codes import AFTER, AT, EVERY, FIRST_TICK, NO_TRANSITION
 from hybrid.kernels.types.options import KERNEL
 
 
@@ -26,6 +26,13 @@ def renew(model, run, scalar):
         else:
             run.ticks[place] = number
     return True
+
+
+@njit(**KERNEL)
+def is_cut_short(model, run, transition, k):
+    """Whether a reset at this instant has made a duration shorter than the time that had passed."""
+    may_be = model.moving.shape[0] > 0 and model.clock[transition] >= AFTER
+    return may_be and is_behind(model, run, transition, k)
 
 
 @njit(**KERNEL)
