@@ -96,7 +96,7 @@ def _row_at(system: HybridSystem, transition: int, t: float, x: np.ndarray, mode
         return 0
     values = model.parameters[: len(system.parameters)]
     ticks, rows = ticks_of(clock, system.variables.state_view(x), system.variables.parameter_view(values))
-    return int(np.broadcast_to(rows, len(ticks))[np.argmin(np.abs(np.subtract(ticks, t)))])
+    return 0 if rows is None else int(rows[np.argmin(np.abs(np.subtract(ticks, t)))])
 
 
 def matrices_at(

@@ -30,22 +30,26 @@ def as_quantity(kind: str, name: str, value: Any) -> Quantity:
     return float(number)
 
 
-def read(quantity: Quantity, p: Any) -> Any:
-    """The value of a quantity at parameters."""
-    if isinstance(quantity, str):
+def read(quantity: Quantity, x: Any, p: Any) -> Any:
+    """The value of a quantity at a state and parameters."""
+    if isinstance(quantity, float):
+        return quantity
+    if isinstance(quantity, str) and quantity in p._fields:
         return getattr(p, quantity)
-    return quantity(p) if callable(quantity) else quantity
+    given = Given(x, p)
+    return getattr(given, quantity) if isinstance(quantity, str) else quantity(given)
 
 
-@attrs.frozen(eq=False)
 class Given:
     """What the quantities of a clock read by name: parameters, and what resets alone change of the state."""
 
-    x: Any
-    p: Any
+    __slots__ = ("p", "x")
+
+    def __init__(self, x: Any, p: Any) -> None:
+        self.x, self.p = x, p
 
     def __getattr__(self, name: str) -> Any:
-        held = name not in getattr(self.p, "_fields", (name,)) and name in getattr(self.x, "_fields", ())
+        held = name not in self.p._fields and name in getattr(self.x, "_fields", ())
         return getattr(self.x if held else self.p, name)
 
     def __iter__(self) -> Any:
@@ -81,7 +85,7 @@ def numbers_of(clock: Clock, x: Any, p: Any) -> tuple[Any, ...]:
 
 
 def ticks_of(clock: Clock, x: Any, p: Any) -> tuple[Sequence[float], Any]:
-    """The numbers of a clock as kernels get them, and the row of a schedule that each belongs to."""
+    """The numbers of a clock as kernels get them, and the row of a schedule that each belongs to, if any."""
     return clock._ticks(x, p)
 
 
@@ -165,16 +169,15 @@ class Clock(Portable):
 
     def _numbers(self, x: Any, p: Any) -> tuple[Any, ...]:
         """The numbers of the clock at a state and parameters."""
-        given = Given(x, p)
-        return tuple(read(quantity, given) for quantity in self.quantities)
+        return tuple([read(quantity, x, p) for quantity in self.quantities])
 
     def _ticks(self, x: Any, p: Any) -> tuple[Sequence[float], Any]:
-        """The numbers as kernels get them, and the row of a schedule that each belongs to."""
+        """The numbers as kernels get them, and the row of a schedule that each belongs to, if any."""
         return self._in_order(self._numbers(x, p))
 
     def _in_order(self, numbers: Sequence[Any]) -> tuple[Sequence[float], Any]:
         """The same from numbers in the order of ``quantities``."""
-        return tuple(map(float, numbers)), 0
+        return tuple(map(float, numbers)), None
 
     def _since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
         """Time since the nearest tick, negative before it, at the clock's numbers."""

@@ -32,8 +32,8 @@ class Firing:
     schedules: tuple[Any, ...] | None = None
 
     def reads(self, schedule: Any) -> bool:
-        """Whether the columns of a schedule may be read."""
-        return self.schedules is None or any(each is schedule for each in self.schedules)
+        """Whether the columns of a schedule may be read; it may have been made anew, with the same ones."""
+        return self.schedules is None or any(each.columns is schedule.columns for each in self.schedules)
 
 
 def plain_firing(row: int, schedules: tuple[Any, ...] | None = None) -> Firing:

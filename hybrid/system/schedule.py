@@ -32,6 +32,9 @@ def _as_times(value: Any) -> tuple[Quantity, ...]:
 
 
 def _as_columns(value: Any) -> Mapping[str, np.ndarray]:
+    if isinstance(value, FrozenMapping):
+        # Those of a schedule that this one is made from: they tell that both are the same table.
+        return value
     found: dict[str, np.ndarray] = {}
     for name, each in named("At: columns", value, "map names to columns").items():
         if not isinstance(name, str):
@@ -228,9 +231,10 @@ class At(Clock):
 
     def _fault(self, numbers: Sequence[float], moving: bool = False) -> str:
         """What is wrong with the times."""
-        bad = np.flatnonzero(~np.isfinite(np.array(numbers, dtype=float)))
-        if not bad.size:
+        finite = np.isfinite(np.asarray(numbers, dtype=float))
+        if finite.all():
             return ""
+        bad = np.flatnonzero(~finite)
         return f"times[{bad[0]}] must be finite; got {numbers[bad[0]]:.6g}"
 
 

@@ -14,7 +14,7 @@ def put_ticks(
 ) -> None:
     """Write the numbers of all clocks at a state and parameters, and the rows of schedules, into arrays.
 
-    ArgumentError if a number cannot be.
+    Rows are written of listed times alone. ArgumentError if a number cannot be.
     """
     # The numbers of tables are behind the parameters.
     own = parameters[: len(system.parameters)].tolist()
@@ -30,4 +30,5 @@ def put_ticks(
                 owner = f"Transition {transition.name!r}: {type(clock).__name__}"
                 raise ArgumentError(f"{owner}: {fault} with these parameters.")
             ticks[first : first + len(numbers)] = numbers
-            rows[first : first + len(numbers)] = row
+            if row is not None:
+                rows[first : first + len(numbers)] = row

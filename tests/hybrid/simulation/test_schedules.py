@@ -214,3 +214,29 @@ def test_a_time_that_is_not_finite_is_refused_at_the_run():
     system = body(At([1.0, lambda p: 1.0 / p.b]), lambda t, x, p: {}, parameters={"k": K, "b": 1.0})
     with pytest.raises(ArgumentError, match=r"'dose': At: times\[1\] must be finite"):
         hybrid.simulate(system, (0.0,), (0.0, 1.0), parameters={"b": 1e-310})
+
+
+def test_a_schedule_goes_through_a_split():
+    """A block under dry friction: kicks at 0.5, twice at 1, and at 2.5."""
+    kicks = At.table({"t": [1.0, 0.5, 1.0, 2.5], "by": [1.0, 2.0, 4.0, 8.0]})
+    system = HybridSystem(
+        state=("v",),
+        parameters={"mu": 0.5},
+        modes=[Mode("slide", lambda t, x, p: (-p.mu * np.sign(x.v),))],
+        transitions=[
+            Transition("slide", "slide", kicks, Reset(lambda t, x, p: {"v": x.v - kicks["by"]}), name="kick")
+        ],
+    )
+    arc = hybrid.simulate(hybrid.split(system), (1.0,), (0.0, 4.0))
+    assert arc.jumps.row.tolist() == [1, 0, 2, 3]
+    assert arc.x[-1, 0] == pytest.approx(-12.5, rel=1e-14)
+
+
+def test_a_state_without_names_reads_columns_too():
+    kicks = At.table({"t": [1.0, 1.0], "by": [1.0, 2.0]})
+    system = HybridSystem(
+        state=2,
+        modes=[Mode("m", lambda t, x, p: (0.0, 0.0))],
+        transitions=[Transition("m", "m", kicks, Reset(lambda t, x, p: (x[0] + kicks["by"], x[1])))],
+    )
+    assert hybrid.simulate(system, (1.0, 5.0), (0.0, 2.0)).x[-1].tolist() == [4.0, 5.0]
