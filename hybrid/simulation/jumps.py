@@ -301,6 +301,8 @@ class Jumps(Sequence[Jump]):
             "x_plus": (("jump", "state"), self.x_plus, names.states),
             "transversality": ("jump", self.transversality),
         }
+        if np.any(self.row >= 0):
+            variables["row"] = ("jump", self.row)
         found = xarray.Dataset(variables, names.coords(), attributes("jumps", system=self.system))
         sides = {"outputs_minus": self.before, "outputs_plus": self.after}
         tables = {

@@ -17,6 +17,9 @@ from hybrid.system.instants import in_unit
 from hybrid.system.labels import named
 from hybrid.system.rows import entry_that_fires, row_that_fires
 
+# Times in the representation of a schedule.
+MOST_SHOWN = 6
+
 
 def _as_times(value: Any) -> tuple[Quantity, ...]:
     given = (value,) if isinstance(value, str) or callable(value) else value
@@ -29,6 +32,13 @@ def _as_times(value: Any) -> tuple[Quantity, ...]:
     if not found:
         raise ModelError("At: times must hold at least one time; got none.")
     return found
+
+
+def _few(times: tuple[Quantity, ...]) -> str:
+    """The first times, and how many there are."""
+    shown = [repr(each) for each in times[:MOST_SHOWN]]
+    more = [f"... {len(times)} in all"] if len(times) > MOST_SHOWN else []
+    return f"[{', '.join([*shown, *more])}]"
 
 
 def _as_columns(value: Any) -> Mapping[str, np.ndarray]:
@@ -88,7 +98,7 @@ class At(Clock):
     hybrid.errors.ArgumentError: unit must be left out, since At: times holds neither dates nor ...
     """
 
-    times: tuple[Quantity, ...] = attrs.field(converter=_as_times)
+    times: tuple[Quantity, ...] = attrs.field(converter=_as_times, repr=_few)
     when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=check_when)
     columns: Mapping[str, np.ndarray] = attrs.field(
         factory=dict, kw_only=True, converter=_as_columns, repr=False

@@ -240,3 +240,15 @@ def test_a_state_without_names_reads_columns_too():
         transitions=[Transition("m", "m", kicks, Reset(lambda t, x, p: (x[0] + kicks["by"], x[1])))],
     )
     assert hybrid.simulate(system, (1.0, 5.0), (0.0, 2.0)).x[-1].tolist() == [4.0, 5.0]
+
+
+def test_the_jumps_of_a_schedule_as_a_dataset_have_rows():
+    arc = hybrid.simulate(body(At.table(DOSES)), (0.0,), (-1.0, 60.0))
+    assert arc.jumps.to_xarray()["row"].values.tolist() == [1, 0, 3, 2]
+    other = hybrid.simulate(body(Every(7.0), lambda t, x, p: {"c": 1.0}), (0.0,), (0.0, 20.0))
+    assert "row" not in other.jumps.to_xarray()
+
+
+def test_a_long_schedule_is_shown_in_short():
+    assert repr(At([2.0, "a"])) == "At(times=[2.0, 'a'], when=None)"
+    assert len(repr(At(np.arange(1e5)))) < 100
