@@ -225,8 +225,7 @@ class Every(Clock):
     ----------
     period, offset
         Numbers in units of time, names of parameters or of what resets alone change (held components,
-        counters), or functions of ``p``, which has both; the period is positive. With an offset that a reset
-        changes, each tick keeps its number ``k``.
+        counters), or functions of ``p``, which has both; the period is positive.
     when
         Optional condition ``c(t, x, p)``, as that of a `Guard`: a tick without it is passed over.
 

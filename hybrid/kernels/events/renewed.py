@@ -4,7 +4,7 @@ import math
 
 from numba import njit
 
-from hybrid.kernels.events.clocks import first_from, is_behind
+from hybrid.kernels.events.clocks import first_from, is_behind, ticks_now
 from hybrid.kernels.types.codes import AFTER, AT, EVERY, FIRST_TICK, NO_TRANSITION
 from hybrid.kernels.types.options import KERNEL
 
@@ -37,22 +37,24 @@ def is_cut_short(model, run, transition, k):
 
 @njit(**KERNEL)
 def put_number(model, run, transition, place, number):
-    """Change the period or the offset of a clock.
+    """Change the period or the offset of a clock, and find its next tick.
 
-    With another offset each tick keeps its number, so those that are over stay over: a duty of 1 that is set
-    where a period begins ends the period that begins there. With another period ticks are counted anew; one
-    that has just fired is over.
+    A tick of this instant is over if it has just fired. With another offset it is also over if the tick of
+    its number is: a duty of 1 that is set where a period begins ends the period that begins there, one of 0
+    ends it at once.
     """
-    own, starts = model.tick_of[transition], run.last_fired == NO_TRANSITION
-    if place > model.first_tick[transition]:
-        if not starts:
-            run.tick[own] = max(run.tick[own], first_from(model, run, transition, False))
+    own, first = model.tick_of[transition], model.first_tick[transition]
+    if run.last_fired == NO_TRANSITION:
         run.ticks[place] = number
         return
+    next_number = FIRST_TICK
+    if place > first:
+        next_number = max(run.tick[own], first_from(model, run, transition, False))
     run.ticks[place] = number
-    run.ticked[model.clock_of[transition]] = run.tick[own] = FIRST_TICK
-    if not starts:
-        run.tick[own] = first_from(model, run, transition, model.tick_of[run.last_fired] == own)
+    run.ticked[model.clock_of[transition]] = FIRST_TICK
+    run.tick[own] = first_from(model, run, transition, model.tick_of[run.last_fired] == own)
+    if run.tick[own] < next_number and ticks_now(model, run, transition):
+        run.tick[own] = first_from(model, run, transition, True)
 
 
 @njit(**KERNEL)

@@ -305,3 +305,36 @@ def test_the_laws_hold_for_a_sampled_duty(off):
     case = Case(system, system.parameters, "off", (3.0, 0.4, 0.04), 0.05, 0.12)
     check_jumps(case)
     check_saltation(case)
+
+
+@pytest.mark.parametrize("absolute", [False, True])
+def test_an_offset_that_changes_in_between(absolute):
+    """At 0.3, from 0.2 on to 0.8, also told as a time; at 3.9 back."""
+    system = HybridSystem(
+        state=("n",),
+        held=("o",),
+        parameters={"late": 10.8 if absolute else 0.8},
+        modes=[Mode("m", lambda t, x, p: (0.0,))],
+        transitions=[
+            Transition(
+                "m", "m", Every(1.0, offset="o"), Reset(lambda t, x, p: {"n": x.n + 1.0}), name="tick"
+            ),
+            Transition("m", "m", At([0.3]), Reset(lambda t, x, p: {"o": p.late}), name="later"),
+            Transition("m", "m", At([3.9]), Reset(lambda t, x, p: {"o": 0.2}), name="back"),
+        ],
+    )
+    arc = hybrid.simulate(system, (0.0, 0.2), (0.0, 6.0))
+    np.testing.assert_allclose(times_of(arc, "tick"), [0.2, 0.8, 1.8, 2.8, 3.8, 4.2, 5.2], rtol=1e-14)
+    check_ticks(Case(system, system.parameters, "m", (0.0, 0.2), 0.0, 6.0))
+
+
+def test_a_period_that_changes():
+    """Each tick doubles the period: the ticks are at whole multiples of it."""
+    system = HybridSystem(
+        state=("n",),
+        held=("T",),
+        modes=[Mode("m", lambda t, x, p: (0.0,))],
+        transitions=[Transition("m", "m", Every("T"), Reset(lambda t, x, p: {"T": 2.0 * x.T}), name="tick")],
+    )
+    arc = hybrid.simulate(system, (0.0, 0.25), (0.0, 5.0))
+    np.testing.assert_allclose(times_of(arc, "tick"), [0.25, 0.5, 1.0, 2.0, 4.0], rtol=1e-15)
