@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hybrid import ArgumentError, HybridArc, StatusCode, arguments
+from hybrid import ArgumentError, HybridArc, HybridSystem, Section, StatusCode, arguments
 from hybrid.display.tables import with_unit
 from hybrid.plot import DATASETS, drawn
 from hybrid.plot.datasets import SECTION, column, column_label, column_name
-from hybrid.plot.style import Rows, as_component, axes_for, dot_area, mark, small_legend, told
+from hybrid.plot.style import Rows, axes_for, dot_area, mark, named_quantity, small_legend, told
 from hybrid.simulation.labelled import Names
 from lyapunov.compare import ModelComparison
 from lyapunov.convergence import (
@@ -99,22 +99,22 @@ def plot_phase_portrait(
     x: str,
     y: str,
     *,
-    section: ArrayLike | None = None,
+    section: Section | ArrayLike | None = None,
     labels: tuple[str, str] | None = None,
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
     size: float | None = None,
 ) -> Axes:
-    """Orbit in the plane of two state components, with jumps as straight lines and points of a section.
+    """Orbit in the plane of two components or outputs, with jumps as straight lines and points of a section.
 
     Parameters
     ----------
     arc
         An arc with dense output, simulated without ``samples``.
     x, y
-        Names of the components.
+        Names or indices of the state's components, or names of outputs.
     section
-        Points ``(N, n)`` to mark.
+        What to mark: a section of the model, or points ``(N, n)``, of which no outputs are known.
     labels
         Labels of the axes; by default the names, with their units.
     ax
@@ -133,23 +133,19 @@ def plot_phase_portrait(
     'position'
     """
     system = arguments.instance("arc", arc, HybridArc, "Make one with hybrid.simulate.").system
-    i, j = as_component("x", system.state_names, x), as_component("y", system.state_names, y)
-    marks = None if section is None else numbers("section", section, 2)
-    if marks is not None and marks.shape[1] != system.dimension:
-        raise arguments.refusal("section", f"hold points of {system.dimension} components", section)
+    shown = named_quantity("x", system, x), named_quantity("y", system, y)
+    marks = None if section is None else _marks(section, system, shown)
     names = Names(system.state_names, system.units)
-    across, up = axis_labels(labels, names.label(names.state[i]), names.label(names.state[j]))
+    across, up = axis_labels(labels, *(names.label(name) for name in shown))
     large, small = (26.0, 2.0) if size is None else (dot_area(1, size),) * 2
     (ax,) = axes_for(ax, 1, FIGURE, figsize)
-    orbit = _dense(arc)
-    ax.plot(orbit[:, i], orbit[:, j], color=COLOURS[5], linewidth=0.5, alpha=0.8, rasterized=True)
+    orbit = [_dense(arc, name) for name in shown]
+    ax.plot(*orbit, color=COLOURS[5], linewidth=0.5, alpha=0.8, rasterized=True)
     if marks is not None:
         # A large dot makes a fixed point visible; small dots keep a cloud of points readable.
-        spread = np.ptp(marks, axis=0) > SAME_POINT * np.ptp(orbit, axis=0) if len(marks) else False
-        area = small if np.any(spread) else large
-        ax.scatter(
-            marks[:, i], marks[:, j], s=area, color=COLOURS[1], linewidths=0, zorder=3, rasterized=True
-        )
+        apart = any(_spread(m) > SAME_POINT * _spread(o) for m, o in zip(marks, orbit, strict=True))
+        area = small if apart else large
+        ax.scatter(marks[0], marks[1], s=area, color=COLOURS[1], linewidths=0, zorder=3, rasterized=True)
     ax.set_xlabel(across)
     ax.set_ylabel(up)
     return ax
@@ -165,12 +161,34 @@ def axis_labels(labels: object, *names: str) -> tuple[str, str]:
     return texts[0], texts[1]
 
 
-def _dense(arc: HybridArc) -> np.ndarray:
-    """Points along an arc in order, dense enough for a smooth line, with both sides of each jump."""
+def _marks(section: object, system: HybridSystem, names: Sequence[str]) -> list[np.ndarray]:
+    """What the points of a section have under these names."""
+    if isinstance(section, Section):
+        return [section[name] for name in names]
+    points = numbers("section", section, 2)
+    if points.shape[1] != system.dimension:
+        raise arguments.refusal("section", f"hold points of {system.dimension} components", section)
+    missing = [name for name in names if name in system.outputs]
+    if missing:
+        raise ArgumentError(
+            f"section: Of points only the state is known, and {missing[0]!r} is an output. "
+            "Give the section itself, as hybrid.poincare_section returns it."
+        )
+    return [points[:, system.state_names.index(name)] for name in names]
+
+
+def _spread(values: np.ndarray) -> float:
+    """How far numbers lie apart; those that are none do not count."""
+    found = values[np.isfinite(values)]
+    return float(np.ptp(found)) if len(found) else 0.0
+
+
+def _dense(arc: HybridArc, name: str) -> np.ndarray:
+    """Values along an arc in order, dense enough for a smooth line, with both sides of each jump."""
     times = np.linspace(arc.t[0], arc.t[-1], POINTS_OF_A_PORTRAIT)
     jumps = np.searchsorted(arc.jumps.t, times, side="right")
     order = np.lexsort((np.concatenate([arc.t, times]), np.concatenate([arc.j, jumps])))
-    return np.concatenate([arc.x, arc(times)])[order]
+    return np.concatenate([arc[name], arc(times, name)])[order]
 
 
 def plot_exponents(

@@ -9,7 +9,7 @@ import xarray
 import hybrid
 import lyapunov
 import models
-from hybrid import DOP853, ArgumentError
+from hybrid import DOP853, ArgumentError, Guard
 from lyapunov.maps import KINDS
 from lyapunov.plot import (
     kinds,
@@ -303,6 +303,22 @@ class TestPhasePortrait:
         np.testing.assert_array_equal(dots.get_offsets(), section)
         assert (dots.get_sizes()[0] > 10.0) == (spread < 1e-6)
         assert (ax.get_xlabel(), ax.get_ylabel()) == ("a", "b")
+
+    def test_an_output_in_the_plane_and_at_a_section(self):
+        ball = models.bouncing_ball()
+        arc = hybrid.simulate(ball, (1.0, 0.0), (0.0, 2.0))
+        section = hybrid.poincare_section(ball, (1.0, 0.0), Guard(lambda t, x, p: x.v, -1), points=3)
+        ax = plot_phase_portrait(arc, "q", "energy", section=section)
+        q, energy = ax.lines[0].get_xdata(), ax.lines[0].get_ydata()
+        assert energy[0] == pytest.approx(9.81 * q[0], rel=1e-14)
+        levels = 9.81 * 0.8 ** (2 * np.arange(len(arc.jumps) + 1))
+        assert np.min(np.abs(energy[:, None] - levels), axis=1).max() < 1e-9
+        # At the top all energy is that of the height.
+        tops, found = ax.collections[0].get_offsets().T
+        np.testing.assert_allclose(found, 9.81 * tops, rtol=1e-12)
+        assert ax.get_ylabel() == f"energy ({ball.units['energy']})"
+        with pytest.raises(ArgumentError, match="only the state is known, and 'energy' is an output"):
+            plot_phase_portrait(arc, "q", "energy", section=section.x)
 
 
 def test_a_spectrum_has_bars_of_two_standard_errors_inside_of_its_limits():
