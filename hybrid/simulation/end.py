@@ -34,8 +34,8 @@ KIND = "end"
 # Arrays of a run with an entry for each transition, for each mode, and for each component of the state along
 # the last axis, before others.
 BY_TRANSITION = (
-    "side", "on_guard", "due", "fires", "side_before", "order_before", "unproved_before", "event_side",
-    "tried_side", "tried_due", "tried_order", "passed", "tick", "ticked",
+    "side", "on_guard", "due", "fires", "side_before", "order_before", "unproved_before",
+    "tried_side", "tried_due", "tried_order", "tick", "ticked",
 )  # fmt: skip
 BY_MODE = ("first_step", "stay")
 BY_COMPONENT = ("scale", "stretch", "visits", "trail")

@@ -338,3 +338,34 @@ def test_a_period_that_changes():
     )
     arc = hybrid.simulate(system, (0.0, 0.25), (0.0, 5.0))
     np.testing.assert_allclose(times_of(arc, "tick"), [0.25, 0.5, 1.0, 2.0, 4.0], rtol=1e-15)
+
+
+def test_clocks_that_read_held_components_go_through_a_split():
+    """A block under dry friction is kicked each second, and rests for a time that the kick decides."""
+    system = HybridSystem(
+        state=("v",),
+        held=("d",),
+        parameters={"mu": 0.5},
+        modes=[Mode("slide", lambda t, x, p: (-p.mu * np.sign(x.v),)), Mode("rest", lambda t, x, p: (0.0,))],
+        transitions=[
+            Transition(
+                "slide",
+                "slide",
+                Every(1.0),
+                Reset(lambda t, x, p: {"v": x.v - 1.7, "d": 0.1 * t}),
+                name="kick",
+            ),
+            Transition("slide", "rest", After(lambda p: 10.0 * p.mu * p.d, restarts=False), name="pause"),
+            Transition("rest", "slide", After("d"), name="on"),
+        ],
+        start="slide",
+    )
+    start, span = (1.0, 10.0), (0.0, 6.0)
+    whole, parts = (hybrid.simulate(each, start, span) for each in (system, hybrid.split(system)))
+    np.testing.assert_allclose(parts.jumps.t, whole.jumps.t, rtol=1e-14)
+    # The kick at 1 cuts the first stay short. The next begin at 1.1, 1.7 and 2.9, for five times the duration.
+    assert times_of(whole, "pause") == pytest.approx([1.0, 1.1 + 0.5, 1.7 + 1.0, 2.9 + 2.0])
+    np.testing.assert_allclose(parts.x[-1], whole.x[-1], rtol=1e-13)
+    slope = quotient(lambda h: hybrid.simulate(system, (1.0 + h, 10.0), span).x[-1], 1e-6)
+    found = hybrid.simulate(hybrid.split(system), start, span, tangent=True).fundamental[:, 0]
+    np.testing.assert_allclose(found, slope, atol=1e-8)
