@@ -75,7 +75,7 @@ def rounding_of_tick(model, run, transition, k):
     if kind == AT:
         return ROUNDING_OF_TICK * abs(run.ticks[first + min(k, model.first_tick[transition + 1] - first - 1)])
     begin, phase, _ = begin_of_count(model, run, transition)
-    return ROUNDING_OF_TICK * (abs(begin * model.period + phase) + run.ticks[first])
+    return ROUNDING_OF_TICK * (abs(begin * model.period + phase) + abs(run.ticks[first]))
 
 
 @njit(**KERNEL)

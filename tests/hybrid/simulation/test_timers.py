@@ -363,7 +363,7 @@ def test_clocks_that_read_held_components_go_through_a_split():
     start, span = (1.0, 10.0), (0.0, 6.0)
     whole, parts = (hybrid.simulate(each, start, span) for each in (system, hybrid.split(system)))
     np.testing.assert_allclose(parts.jumps.t, whole.jumps.t, rtol=1e-14)
-    # The kick at 1 cuts the first stay short. The next begin at 1.1, 1.7 and 2.9, for five times the duration.
+    # The kick at 1 cuts the first stay short. The next begin at 1.1, 1.7 and 2.9, for 5 times the duration.
     assert times_of(whole, "pause") == pytest.approx([1.0, 1.1 + 0.5, 1.7 + 1.0, 2.9 + 2.0])
     np.testing.assert_allclose(parts.x[-1], whole.x[-1], rtol=1e-13)
     slope = quotient(lambda h: hybrid.simulate(system, (1.0 + h, 10.0), span).x[-1], 1e-6)
