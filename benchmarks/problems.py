@@ -12,7 +12,7 @@ from scipy.linalg import expm
 import models
 from benchmarks.common import ROOT
 from benchmarks.peers.problem import Problem
-from hybrid import Answer, Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Answer, Guard, HybridSystem, Laws, Mode, Reset, Transition
 
 
 def problems() -> dict[str, Problem]:
@@ -55,7 +55,7 @@ def stored(name: str) -> Any:
 def always_touching(system: HybridSystem) -> HybridSystem:
     """The field of the contact everywhere; its force is zero where the bodies are apart."""
     contact = next(mode for mode in system.modes if mode.name == "contact")
-    return attrs.evolve(system, modes=[contact], transitions=[])
+    return attrs.evolve(system, modes=[contact], transitions=[], outputs={}, units={}, laws=Laws())
 
 
 def _impact_oscillator() -> Problem:

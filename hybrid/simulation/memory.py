@@ -21,6 +21,8 @@ from hybrid.simulation.periods import split_time
 
 # Deep enough for intervals halved down to rounding.
 ISOLATION_DEPTH = 64
+# Parts of a step on which a guard is judged by its leading powers: halves, quarters and eighths of it.
+PARTS = 8
 # Transitions remembered in the order in which they fired: enough to see which go round without end. A power
 # of two.
 RECENT = 64
@@ -189,6 +191,8 @@ def work_layout(method: Any, dimension: int, tangents: int, guards: int, columns
         "pivots": ((coupled + 1) * n,),
         "series": (codes.HIGHEST_ORDER + 3, width_of_series) if method.order else (0, 0),
         "weights": (1, width_of_series),
+        "polynomial": (codes.HIGHEST_ORDER + 4,),
+        "stack": (PARTS, codes.LEADING + 4),
         "registers": (max(rows, 1), codes.REGISTERS),
         "samples": (max(len(method.nodes), len(method.series_nodes)) + 1, 2 * rows),
         "rates": (2, length),

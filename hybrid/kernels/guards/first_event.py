@@ -15,7 +15,6 @@ from numba import njit
 
 from hybrid.kernels.events.guards import (
     ROUNDING_OF_STATE,
-    error_band,
     guard_speed,
     guard_value,
     rounding_band,
@@ -28,7 +27,8 @@ from hybrid.kernels.events.resolution import (
     sides_at_share,
     underflows,
 )
-from hybrid.kernels.guards.form import NO_COLUMN, in_column
+from hybrid.kernels.guards.form import NO_COLUMN
+from hybrid.kernels.guards.leading import CROSSES, ROUNDING_OF_TERMS, UNKNOWN, crossing_by_leading
 from hybrid.kernels.guards.touch import forget_touches, note_touch, share_with_one_touch
 from hybrid.kernels.types.codes import NO_TRANSITION
 from hybrid.kernels.types.layout import EPSILON
@@ -39,8 +39,6 @@ from hybrid.kernels.types.task import task_of
 MARGIN = 100.0
 # Number of terms at the end of a series by which its error is judged: some may be zero.
 TAIL_OF_GUARD = 5
-# Rounding of a series, as a share of the sum of the magnitudes of its terms.
-ROUNDING_OF_TERMS = 64.0 * EPSILON
 # What a crossing counts that is not certain: a guard that is clear of zero on both sides of it is.
 UNCERTAIN = 2
 
@@ -150,20 +148,6 @@ def is_resolved(model, run, transition, column, path, attempted, on_guard, work)
 
 
 @njit(**KERNEL)
-def crosses_beyond_errors(model, method, run, transition, column, path, work):
-    """Whether a guard, a column of the path, comes from beyond its errors and ends the step beyond them."""
-    side, powers = run.side[transition], path.powers
-    model.guard_gradient(transition, path.start, run.y, model.parameters, work.gradient)
-    if path.exact:
-        band = rounding_band(model, run, transition, path.start, run.y, work)
-    else:
-        band = error_band(method, run, work.gradient, model.controlled)
-    band = in_column(path, column, band)
-    begins = run.order_before[transition] == BY_SPEED or powers[0, column] * side > band
-    return begins and powers[path.degree + 1, column] * side < -band
-
-
-@njit(**KERNEL)
 def crossing_of(task, transition, column, path, attempted):
     """Where a guard crosses, the share of the step that is proved, and whether the crossing is resolved."""
     attempts, model, method, run, _, work = task_of(task)
@@ -176,12 +160,20 @@ def crossing_of(task, transition, column, path, attempted):
     if small:
         return NO_ROOT, 1.0, True
     on_guard = run.on_guard[transition]
+    if column != NO_COLUMN and on_guard <= BY_SPEED and not attempted:
+        verdict, theta, certain = crossing_by_leading(model, method, run, transition, column, path, work)
+        resolved = verdict != CROSSES or is_resolved(
+            model, run, transition, column, path, attempted, on_guard, work
+        )
+        if verdict == CROSSES:
+            run.crossings += 1 if certain and resolved else UNCERTAIN
+            run.changes[transition] = theta
+        if verdict != UNKNOWN:
+            run.on_guard[transition] = 0
+            return theta, 1.0, resolved
     theta, share = attempts.crossing_on_path(model, method, run, transition, column, path, work)
-    resolved = is_resolved(model, run, transition, column, path, attempted, on_guard, work)
-    plain = resolved and theta == run.changes[transition] < NO_ROOT and column != NO_COLUMN
-    plain = plain and crosses_beyond_errors(model, method, run, transition, column, path, work)
-    run.crossings += 1 if plain else UNCERTAIN
-    return theta, share, resolved
+    run.crossings += UNCERTAIN
+    return theta, share, is_resolved(model, run, transition, column, path, attempted, on_guard, work)
 
 
 @njit(**KERNEL)

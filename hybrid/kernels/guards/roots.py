@@ -20,6 +20,32 @@ MOST_ROOT_STEPS = 200
 UNSEEN = 64.0
 
 
+@njit(**INLINE)
+def expanded_at(series, column, first, order, s):
+    """Value, derivative and half the second one of a series divided by its variable to the power ``first``.
+
+    Horner's scheme in ``s**2`` for even and for odd terms, which do not wait for each other.
+    """
+    square = s * s
+    even, even_slope, even_bend = 0.0, 0.0, 0.0
+    odd, odd_slope, odd_bend = 0.0, 0.0, 0.0
+    top = order
+    if (order - first) % 2 == 0:
+        even = series[order, column]
+        top = order - 1
+    for o in range(top, first, -2):
+        odd_bend = odd_bend * square + odd_slope
+        odd_slope = odd_slope * square + odd
+        odd = odd * square + series[o, column]
+        even_bend = even_bend * square + even_slope
+        even_slope = even_slope * square + even
+        even = even * square + series[o - 1, column]
+    value = even + s * odd
+    slope = odd + 2.0 * (s * even_slope + square * odd_slope)
+    bend = even_slope + s * (3.0 * odd_slope + 4.0 * (s * even_bend + square * odd_bend))
+    return value, slope, bend
+
+
 @njit(**KERNEL)
 def time_of(series, clock, order, h, span):
     """Place on ``[0, h]`` where the clock shows ``span``: Newton's method in a bracket; time only grows."""
@@ -29,10 +55,7 @@ def time_of(series, clock, order, h, span):
     if s == 0.0:
         return s
     for _ in range(MOST_ROOT_STEPS):
-        value, slope = 0.0, 0.0
-        for o in range(order, -1, -1):
-            slope = slope * s + value
-            value = value * s + series[o, clock]
+        value, slope, _ = expanded_at(series, clock, 0, order, s)
         misfit = value - span
         if misfit > 0.0:
             high = s

@@ -56,6 +56,9 @@ NO_OBJECTION = 0
 LEAVES = 1
 BEYOND = 2
 
+# Number of leading powers of a guard whose Bernstein coefficients lie in registers.
+LEADING = 16
+
 # Order of exact series, which no other exceeds: what the memory for series is laid out for.
 HIGHEST_ORDER = 32
 # Steps after which tangent vectors that are kept orthonormal are looked at. An exact step brings them closer

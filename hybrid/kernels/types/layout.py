@@ -309,9 +309,10 @@ class Work(Structure):
     its end; ``scale_before (n,)``, sizes of the state that the run goes back to; ``saltation, sizes (n, n)``;
     ``rounding (4, n)``, how far the rates move, and the place where a guard's derivatives are asked for;
     ``path (d + 3, n + guards)``, the powers of the step's interpolant and of guards on it, their values at
-    its end and what these are sums of; ``intervals`` for the isolation of a guard; ``registers (r, 6)``, what
-    is known of each row of a program, and ``samples (nodes + 1, 2 r)`` the ranges of these rows at the nodes
-    of a step and what they have in common; ``rates (2, N)``, the field along a step.
+    its end and what these are sums of; ``polynomial`` and ``stack`` hold the leading powers of a guard,
+    ``intervals`` the pieces of its isolation; ``registers (r, 6)``, what is known of each row of a program,
+    and ``samples (nodes + 1, 2 r)`` the ranges of these rows at the nodes of a step and what they have in
+    common; ``rates (2, N)``, the field along a step.
 
     For implicit methods, else empty: ``systems ((s + 1) n + s + 4, s n)``, ``pivots ((s + 1) n,)``. The rows
     are the factored matrix of the stages, that of the estimate's filter ``(n, n)``, a right-hand side, and
@@ -342,6 +343,8 @@ class Work(Structure):
     sizes: MATRIX
     rounding: MATRIX
     path: MATRIX
+    polynomial: VECTOR
+    stack: MATRIX
     intervals: MATRIX
     registers: MATRIX
     samples: MATRIX
