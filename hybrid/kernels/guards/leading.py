@@ -15,7 +15,7 @@ from hybrid.kernels.arithmetic.lanes import four_times, load, store
 from hybrid.kernels.events.guards import error_band, rounding_band
 from hybrid.kernels.events.onset import BY_SPEED, NO_ROOT, crosses_towards
 from hybrid.kernels.guards.form import in_column
-from hybrid.kernels.guards.roots import expanded_at
+from hybrid.kernels.guards.roots import UNSEEN, expanded_at
 from hybrid.kernels.types.codes import LEADING, NARROW
 from hybrid.kernels.types.kinds import REAL
 from hybrid.kernels.types.layout import EPSILON
@@ -38,8 +38,6 @@ POWERS = np.array(
 CLEAR, CROSSES, UNKNOWN = range(3)
 # If a part this short is not decided, the whole polynomial is used.
 SHORTEST_PART = 0.2
-# Safety factor for the estimated error of the last step towards a root, which leaves out higher derivatives.
-UNSEEN = 64.0
 # Below this share of a root a step of Newton's method is so short that the next one would be rounding.
 SETTLED_STEP = 1e-8
 # Most steps of Newton's method from a root without to one with what is zero at the start up to rounding.
