@@ -15,7 +15,7 @@ from hybrid.kernels.arithmetic.lanes import four_times, load, store
 from hybrid.kernels.events.guards import error_band, rounding_band
 from hybrid.kernels.events.onset import BY_SPEED, NO_ROOT, crosses_towards
 from hybrid.kernels.guards.form import in_column
-from hybrid.kernels.guards.roots import UNSEEN, expanded_at
+from hybrid.kernels.guards.roots import MOST_ROOT_STEPS, UNSEEN, expanded_at
 from hybrid.kernels.types.codes import LEADING, NARROW
 from hybrid.kernels.types.kinds import REAL
 from hybrid.kernels.types.layout import EPSILON
@@ -40,8 +40,6 @@ CLEAR, CROSSES, UNKNOWN = range(3)
 SHORTEST_PART = 0.2
 # Below this share of a root a step of Newton's method is so short that the next one would be rounding.
 SETTLED_STEP = 1e-8
-# Most steps of Newton's method from a root without to one with what is zero at the start up to rounding.
-MOST_CORRECTIONS = 60
 
 
 @njit(**INLINE)
@@ -207,7 +205,7 @@ def root_between(path, column, known_roots, bracket, side):
     0 is zero up to rounding only; but not to a root at 0, where the step begins.
     """
     s, h = simple_root_of(path, column, known_roots, bracket, side), path.length
-    for _ in range(MOST_CORRECTIONS if known_roots > 0 else 0):
+    for _ in range(MOST_ROOT_STEPS if known_roots > 0 else 0):
         value, slope, _ = expanded_at(path.powers, column, 0, path.degree, s)
         shift = -value / slope if slope != 0.0 else 0.0
         if not abs(shift) <= 1e-6 * h or not 0.5 * s <= s + shift <= h:
