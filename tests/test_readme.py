@@ -76,7 +76,18 @@ def is_among(text, numbers):
     return any(abs(float(text) - number) <= (1e-9 if exact else 1.0001 * unit) for number in numbers)
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if page != TOUR], ids=lambda page: page.name)
+# A run that goes on from the end of another begins at the very numbers with which that ended.
+GO_ON = ("dwell.md", "save-and-resume.md")
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=pytest.mark.as_given if page.name in GO_ON else (), id=page.name)
+        for page in PAGES
+        if page != TOUR
+    ],
+)
 def test_blocks_run_and_print_what_their_comments_say(page):
     assert run(page)[2] == []
 

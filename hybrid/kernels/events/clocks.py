@@ -148,8 +148,10 @@ def wind(model, run):
             begins = entered if model.clock[transition] == AFTER else starts or moved
             run.tick[own] = 0 if begins else run.tick[own]
             continue
-        ahead = starts and not leads_to_part(model, transition)
-        run.tick[own] = max(run.tick[own], first_from(model, run, transition, ahead))
+        if starts or mode != run.previous_mode:
+            # In the mode itself the count goes on: an event may land a last bit behind a tick that is due.
+            ahead = starts and not leads_to_part(model, transition)
+            run.tick[own] = max(run.tick[own], first_from(model, run, transition, ahead))
         if moved:
             run.tick[own] = max(run.tick[own], run.ticked[model.clock_of[transition]])
 

@@ -2,8 +2,11 @@
 
 from numba import njit
 
-from hybrid.kernels.types.layout import Path
+from hybrid.kernels.types.layout import EPSILON, Path
 from hybrid.kernels.types.options import INLINE, KERNEL
+
+# Rounding error of a state or a time, as a multiple of EPSILON times its size.
+ROUNDING_OF_START = 16.0
 
 
 @njit(**INLINE)
@@ -51,3 +54,20 @@ def time_at(path, s):
 def pace_at_start(path):
     """How fast time passes at the start, by the variable."""
     return path.powers[1, path.clock] if path.clock >= 0 else path.pace
+
+
+@njit(**KERNEL)
+def rounding_of_start(path, n, scale, time_scale):
+    """How far along a step its start may lie by the rounding of its state and time.
+
+    ``scale (n,)`` and ``time_scale`` are the sizes of state and time.
+    """
+    size, speed = 0.0, 0.0
+    for i in range(n):
+        if path.powers[1, i] != 0.0:
+            size, speed = max(size, scale[i]), max(speed, abs(path.powers[1, i]))
+    place = size / speed if speed > 0.0 else 0.0
+    rate = pace_at_start(path)
+    if rate > 0.0:
+        place = max(place, time_scale / rate)
+    return ROUNDING_OF_START * EPSILON * place

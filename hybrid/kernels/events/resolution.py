@@ -30,12 +30,15 @@ def sides_at_share(model, run, share, fired):
 
     A guard that crosses in its direction may have passed zero the other way before; where that was the last
     to happen, it is there still. If the event is closer to that passing than to the crossing, the guard has
-    not crossed again, whatever rounding and the error of the step make of its sign there.
+    not crossed again, whatever rounding and the error of the step make of its sign there. One whose side the
+    step itself has shown has none yet, unless it crosses later on the step.
     """
     for slot in range(model.first_outgoing[run.mode], model.first_outgoing[run.mode + 1]):
         transition = model.outgoing[slot]
         before = run.side_before[transition]
-        if transition != fired:
+        if before == 0 and run.changes[transition] == NO_ROOT:
+            run.side[transition] = 0
+        elif before != 0 and transition != fired:
             run.side[transition] = -before if run.changes[transition] < share else before
 
 

@@ -19,11 +19,12 @@ from hybrid.kernels.events.guards import (
     has_program,
     may_jump,
     rounding_band,
+    size_of_time,
     was_left_behind,
 )
 from hybrid.kernels.events.moments import Place, sign_along
 from hybrid.kernels.events.onset import AT_REST, BY_SPEED, LATER, NO_ROOT, crosses_towards, has_just_fired
-from hybrid.kernels.events.path import pace_at_start
+from hybrid.kernels.events.path import pace_at_start, rounding_of_start
 from hybrid.kernels.guards.form import (
     NO_COLUMN,
     WITHIN_ROUNDING,
@@ -171,6 +172,10 @@ def _later(model, run, path, guard, noise, work):
         pace = pace_at_start(path)
         if towards == guard.side and pace > 0.0:
             sure = moment / pace
+        elif jumps:
+            # By rounding the state may still be before the jump.
+            beyond = rounding_of_start(path, model.dimension, run.scale, size_of_time(model, t))
+            first = max(first, min(beyond, 0.5 * path.length))
     guard = Guard(
         transition,
         guard.column,
@@ -247,5 +252,8 @@ def crossing_on_path(model, method, run, transition, column, path, work):
     theta, passed = (NO_ROOT if place == NOWHERE else place / path.length), run.changes[transition]
     run.on_guard[transition] = 0
     run.side[transition] = guard.side if theta == NO_ROOT else -guard.side
-    run.changes[transition] = theta if passed == NO_ROOT else 0.5 * (passed + min(theta, 1.0))
+    if passed < NO_ROOT and (theta < NO_ROOT or run.side_before[transition] != 0):
+        run.changes[transition] = 0.5 * (passed + min(theta, 1.0))
+    else:
+        run.changes[transition] = theta
     return theta, proved / path.length

@@ -5,7 +5,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.arithmetic.clock import measured_time
-from hybrid.kernels.events.guards import guard_speed, guard_value, rounding_band
+from hybrid.kernels.events.guards import guard_speed, guard_value, may_jump, rounding_band
 from hybrid.kernels.events.onset import NO_ROOT, crosses_towards
 from hybrid.kernels.events.resolution import speed_displaced
 from hybrid.kernels.steps.step import attempt_again
@@ -61,6 +61,16 @@ def reach_any(task, h):
 
 
 @njit(**KERNEL)
+def turns_back(model, run, transition, side, t, s, work):
+    """Whether a guard that does not jump leads back to its side, where a step ends within its rounding."""
+    speed = guard_speed(model, transition, t, work.new, work.stages[s], work.gradient)
+    if not speed * side > 0.0 or may_jump(model, run, transition, t, work.new, work):
+        return False
+    value = guard_value(model, transition, t, work.new, work.scalar)
+    return abs(value) <= rounding_band(model, run, transition, t, work.new, work)
+
+
+@njit(**KERNEL)
 def land(task, transition, side, h, theta):
     """Shorten the step so that it ends on the guard, with the end in ``work.new``.
 
@@ -102,7 +112,7 @@ def land(task, transition, side, h, theta):
         if before and after and high - low <= 2.0 * EPSILON * max(high, rounding):
             if length != high:
                 attempt_again(task, high)
-            return high, 0.0
+            return (NOT_THERE if turns_back(model, run, transition, side, t + high, s, work) else high), 0.0
         newton, change = length + correction, abs(correction)
         # A Newton step longer than the error of the interpolant follows another slope, that beside a jump.
         trusted = (smooth or change <= MOST_CORRECTION * h) and (trial < 3 or change <= 0.5 * last)

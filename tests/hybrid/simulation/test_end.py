@@ -28,6 +28,9 @@ from hybrid import (
 )
 from hybrid.simulation.trajectory import start
 
+# A run that goes on from the end of another begins at the very numbers with which that ended.
+pytestmark = pytest.mark.as_given
+
 
 def chained():
     """A jump that sets off another one at the same instant."""

@@ -160,7 +160,7 @@ def test_a_run_never_computes_an_output():
     arc = run(system, tangent=True, sensitivities=("k",))
     assert arc.jump_count > 0
     assert len(calls) == made
-    assert arc["counted"][0] == 0.2
+    assert arc["counted"][0] == pytest.approx(0.2, rel=1e-14)
     assert len(calls) > made
 
 

@@ -50,7 +50,7 @@ def test_both_sides_of_a_condition():
             )
         ],
     )
-    fall = {"t_span": (0.0, 2.0), "examples": 20}
+    fall = {"t_span": (0.0, 2.0), "examples": 60}
     report = check_system(holed, states={"q": 0.1, "v": 0.0}, **fall)
     assert report.jumps["floor"] > 0
     assert report.one_sided == ()
