@@ -20,7 +20,7 @@ from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names, attributes, with_outputs
 from hybrid.simulation.memory import empty_record
-from hybrid.simulation.quantities import mode_indices, quantity, table_of
+from hybrid.simulation.quantities import Asked, mode_indices, table_of
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
@@ -38,7 +38,7 @@ STEPS_BETWEEN_POINTS = 1_000_000
 
 
 @attrs.frozen(eq=False, repr=False)
-class Section:
+class Section(Asked):
     """Points of an orbit on a section; ``section["q"]`` is a component of the state, or an output, over them.
 
     Attributes
@@ -74,18 +74,6 @@ class Section:
 
     def __len__(self) -> int:
         return len(self.t)
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        """A component of the state or an output at the points, ``(N,)``.
-
-        An output is nan in modes in which it has no value.
-
-        Raises
-        ------
-        ArgumentError
-            If there is no component and no output of that name.
-        """
-        return self._table([quantity("", name, self.system)])[:, 0]
 
     def _table(self, names: Iterable[str]) -> np.ndarray:
         modes, values = mode_indices(self.system, self.mode), self.system.parameter_values(self.parameters)

@@ -19,7 +19,7 @@ from hybrid.simulation.end import ArcEnd, end_without_component
 from hybrid.simulation.jumps import Grazing, Jumps, Sensitivities, known
 from hybrid.simulation.labelled import Names, attributes, with_counters, with_outputs
 from hybrid.simulation.points import Pieces, Samples, Steps
-from hybrid.simulation.quantities import quantity, slopes_of, table_of, values_of
+from hybrid.simulation.quantities import Asked, quantity, slopes_of, table_of, values_of
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
 
@@ -41,7 +41,7 @@ MADE_LATER = {
 
 
 @attrs.frozen(eq=False, repr=False, slots=False)
-class HybridArc:
+class HybridArc(Asked):
     """A solution over hybrid time ``(t, j)``; ``arc["q"]`` is one component of the state, or an output.
 
     Without ``samples`` the points are the solver's own: both sides of every jump and the ends of every step.
@@ -279,18 +279,6 @@ class HybridArc:
         ]
         names = ("t", "mode", *names)
         return f"<p>{escape(repr(self))}</p>\n<p>{escape(str(self.status))}</p>\n{html_table(names, ends)}"
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        """A component of the state or an output at the points of the arc, ``(N,)``.
-
-        An output is nan in modes in which it has no value.
-
-        Raises
-        ------
-        ArgumentError
-            If there is no component and no output of that name.
-        """
-        return self._table([quantity("", name, self.system)])[:, 0]
 
     def _table(self, names: Iterable[str], points: Any = slice(None)) -> np.ndarray:
         """Components and outputs at points of the arc, ``(N, len(names))``."""

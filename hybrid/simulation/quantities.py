@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,29 @@ def words_for(has_outputs: bool) -> tuple[str, str]:
     if has_outputs:
         return "State component or output", "State components and outputs"
     return "State component", "State components"
+
+
+class Asked:
+    """Base of results that are asked for components and outputs by name."""
+
+    __slots__ = ()
+    system: HybridSystem
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A component of the state or an output at the points, ``(N,)``.
+
+        An output is nan in modes in which it has no value.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no component and no output of that name.
+        """
+        return self._table([quantity("", name, self.system)])[:, 0]
+
+    def _table(self, names: Iterable[str]) -> np.ndarray:
+        """Components and outputs at the points, ``(N, len(names))``."""
+        raise NotImplementedError
 
 
 def mode_indices(system: HybridSystem, names: np.ndarray) -> np.ndarray:

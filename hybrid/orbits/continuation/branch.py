@@ -15,7 +15,7 @@ from hybrid.orbits.continuation.change import Change
 from hybrid.orbits.continuation.labelled import dataset_of
 from hybrid.orbits.continuation.place import Place
 from hybrid.orbits.orbit import PeriodicOrbit
-from hybrid.simulation.quantities import mode_indices, quantity, table_of
+from hybrid.simulation.quantities import Asked, mode_indices, table_of
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
 
@@ -76,7 +76,7 @@ class Bifurcation:
 
 
 @attrs.frozen(eq=False, repr=False)
-class Branch:
+class Branch(Asked):
     """Periodic orbits in order along a branch; the sequence of transitions may change at its bifurcations.
 
     ``branch["q"]`` is a component of the orbits' points, or an output at them.
@@ -153,16 +153,6 @@ class Branch:
 
     def __len__(self) -> int:
         return len(self.parameter)
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        """A component of the state or an output at the points of the orbits, ``(N,)``.
-
-        Raises
-        ------
-        ArgumentError
-            If there is no component and no output of that name.
-        """
-        return self._table([quantity("", name, self.system)])[:, 0]
 
     def _table(self, names: Iterable[str]) -> np.ndarray:
         """Components and outputs at the points of the orbits, ``(N, len(names))``."""
