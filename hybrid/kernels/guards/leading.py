@@ -115,7 +115,7 @@ def falls_throughout(coefficients, degree, slope_of_rest, side):
 
 
 @njit(**KERNEL)
-def judge_leading(degree, rest, slope_of_rest, side, band, last, shortest, stack):
+def judge_leading(degree, rest, slope_of_rest, side, band, last, stack):
     """Proofs about a guard by its leading powers, part by part from the start of the step.
 
     ``stack[0, 2:]`` are their Bernstein coefficients; all the others add no more than ``rest``, and no more
@@ -141,7 +141,7 @@ def judge_leading(degree, rest, slope_of_rest, side, band, last, shortest, stack
             and falls_throughout(row[2:], degree, slope_of_rest * (end - start), side)
         ):
             return CROSSES, start, end, top
-        if end - start < shortest:
+        if end - start < SHORTEST_PART:
             return UNKNOWN, start, end, top
         halve(stack, top, degree)
         top += 1
@@ -238,7 +238,7 @@ def crossing_by_leading(model, method, run, transition, column, path, work):
         return UNKNOWN, NO_ROOT, False
     leading_to_bernstein(work.polynomial, degree, work.stack)
     verdict, start, end, row = judge_leading(
-        degree, rest, order * rest, side, band, powers[order + 1, column], SHORTEST_PART, work.stack
+        degree, rest, order * rest, side, band, powers[order + 1, column], work.stack
     )
     if verdict != CROSSES:
         return verdict, NO_ROOT, False
