@@ -130,7 +130,9 @@ def place_of_change(model, path, guard, form, end, work):
     for trial in range(MOST_ROOT_STEPS):
         at = form_at(model, path, guard, place, work)
         value = _value_in(model, path, guard, at, work)
-        at_rest = value == 0.0 and at.least_slope == 0.0 and at.most_slope == 0.0
+        # Beside a jump bounds tell no slope, and zero is as far as the guard has come.
+        flat = not is_smooth(at) or (at.least_slope == 0.0 and at.most_slope == 0.0)
+        at_rest = value == 0.0 and flat
         value += noise
         # A guard without a value has not crossed yet: it crosses after that.
         if value * side > 0.0 or at_rest or math.isnan(value):

@@ -209,7 +209,6 @@ STAIRS = {
 }
 
 
-@pytest.mark.as_given
 @pytest.mark.parametrize("solver", SOLVERS.values(), ids=SOLVERS)
 @pytest.mark.parametrize("stair", STAIRS)
 def test_a_start_at_the_edge_of_a_stair_at_zero_has_not_crossed(stair, solver):
