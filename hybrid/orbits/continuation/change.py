@@ -8,10 +8,10 @@ from functools import cached_property, partial
 import attrs
 import numpy as np
 
+from hybrid.orbits.continuation.clearances import MOVING, Key, changed, clearance_of
 from hybrid.orbits.continuation.family import Family
 from hybrid.orbits.continuation.grazing import kick, square_root_coefficient, what_follows
 from hybrid.orbits.continuation.instants import is_repeated
-from hybrid.orbits.continuation.measures import MOVING, Key, changed, measure_of
 from hybrid.orbits.continuation.parts import holding
 from hybrid.orbits.continuation.passing import CLOSED, Pass
 from hybrid.orbits.continuation.place import (
@@ -34,7 +34,7 @@ HALVINGS = 6
 MOST_HALVINGS = 60
 # Two places this near on the branch are the same to rounding.
 SHORTEST = 1e-13
-# A measure that has vanished is this share of what it was at a real place nearby.
+# A clearance that has vanished is this share of what it was at a real place nearby.
 VANISHED = 1e-3
 # A change found from its two sides has the same parameter, to this share of the range.
 CLOSE = 1e-2
@@ -77,7 +77,7 @@ class Onward:
 
 @attrs.frozen(eq=False)
 class Exact:
-    """The same change from its side of fewer jumps: the orbit there, its measure, a real place before it."""
+    """The same change from its side of fewer jumps: the orbit, its clearance, a real place before it."""
 
     place: Place
     key: Key
@@ -93,13 +93,13 @@ class Change:
     place
         The orbit there, on the route before.
     key
-        The measure that is zero there.
+        The clearance that is zero there.
     before
         A real place before it.
     onward
         What comes beyond.
     exact
-        The place, the measure and a real place from the side of fewer jumps.
+        The place, the clearance and a real place from the side of fewer jumps.
     """
 
     place: Place
@@ -211,7 +211,7 @@ def _listed(names: tuple[str, ...]) -> str:
 
 
 def located(place: Place, after: Place) -> Change | None:
-    """The first change between a real place and one that is not; None if no measure explains it."""
+    """The first change between a real place and one that is not; None if no clearance explains it."""
     base, near, far, share = place, place, after, 0.5
     for number in range(MOST_HALVINGS):
         length = distance(near, far)
@@ -229,7 +229,7 @@ def located(place: Place, after: Place) -> Change | None:
             far = made[0]
         if number % HALVINGS != HALVINGS - 1:
             continue
-        # The nearer place may be the very one where a measure is zero, and then has no sign.
+        # The nearer place may be the very one where a clearance is zero, and then has no sign.
         for real in dict.fromkeys((near, base)):
             for found, key in _explained(real, near, far):
                 return _simplest(Change(found, key, real, _onward(near, found, key)))
@@ -260,22 +260,22 @@ def _simplest(change: Change) -> Change:
 
 
 def _explained(base: Place, near: Place, far: Place) -> Iterator[tuple[Place, Key]]:
-    """Measures that are zero between two places, each with the place where it is.
+    """Clearances that are zero between two places, each with the place where it is.
 
     They have another sign at a real place ``base``, the nearer one or one before it.
     """
     ahead = distance(base, far)
     for key in changed(base.orbit, far.orbit):
-        measure = partial(_measured, measure_of(key))
-        found = interpolated_zero(base, measure, (0.0, ahead))
-        if found is None or abs(measure(found)) > VANISHED * abs(measure(base)):
+        clearance = partial(_clearance_at, clearance_of(key))
+        found = interpolated_zero(base, clearance, (0.0, ahead))
+        if found is None or abs(clearance(found)) > VANISHED * abs(clearance(base)):
             continue
         if distance(base, found) >= distance(base, near) - BESIDE * ahead:
             yield found, key
 
 
-def _measured(measure: Callable[[Pass], float], place: Place) -> float:
-    return measure(place.orbit)
+def _clearance_at(clearance: Callable[[Pass], float], place: Place) -> float:
+    return clearance(place.orbit)
 
 
 def _onward(near: Place, at: Place, key: Key) -> Onward:

@@ -14,8 +14,8 @@ from hybrid.display.progress import Progress, progress_bar
 from hybrid.display.tables import counted
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation
+from hybrid.orbits.continuation.clearances import curve_clearance_of
 from hybrid.orbits.continuation.curve import SMOOTH, Curve, Special, Spot, along_curve
-from hybrid.orbits.continuation.measures import curve_measure_of
 from hybrid.orbits.continuation.place import Place, place_of, place_on
 from hybrid.orbits.continuation.result import Points, orbit_of, whole_orbit_of
 from hybrid.orbits.continuation.route import Loop
@@ -279,10 +279,10 @@ def _curve_of(bifurcation: Bifurcation, place: Place) -> Curve:
         return Curve(bifurcation.kind, SMOOTH[bifurcation.kind])
     assert bifurcation._change is not None
     exact = bifurcation._change.exact
-    measure = curve_measure_of(exact.key)
-    side = float(np.sign(measure(exact.before.orbit)))
+    clearance = curve_clearance_of(exact.key)
+    side = float(np.sign(clearance(exact.before.orbit)))
     bounded = exact.key.kind != "speed"
-    return Curve(bifurcation.kind, lambda each: measure(each.orbit), side, bounded)
+    return Curve(bifurcation.kind, lambda each: clearance(each.orbit), side, bounded)
 
 
 def _both_ways(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import attrs
 import numpy as np
 
-from hybrid.orbits.continuation.measures import Key, extremum
+from hybrid.orbits.continuation.clearances import Key, extremum
 from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import moment
 from hybrid.system.functions import reset_function

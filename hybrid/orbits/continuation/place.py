@@ -29,7 +29,7 @@ SHORTEST_STEP = 1e-7
 SAME_TIME = 1e-6
 # Stretches are divided anew if errors grow by this much more along one of them than they may.
 TOO_LARGE = 10.0
-# The unknowns are polynomials of a measure through places at these shares of the bracket around its zero.
+# The unknowns are polynomials of a function through places at these shares of the bracket around its zero.
 SHARES = (-1.0, -0.6, -0.25, 0.25, 0.6, 1.0)
 # Two of these polynomials agree to this, in units of the unknowns.
 AGREE = 1e-12
@@ -157,11 +157,11 @@ def zero_on_the_way(
 
 
 def interpolated_zero(
-    place: Place, measure: Callable[[Place], float], bracket: tuple[float, float]
+    place: Place, function: Callable[[Place], float], bracket: tuple[float, float]
 ) -> Place | None:
-    """The place where a measure is zero, between two distances along the branch.
+    """The place where a function is zero, between two distances along the branch.
 
-    The unknowns are smooth functions of the measure, also where the equations are singular at its zero. They
+    The unknowns depend smoothly on its value, also where the equations are singular at its zero. They
     are interpolated through places on both sides of the zero, none of which is near it.
     """
     low, high = bracket
@@ -171,11 +171,11 @@ def interpolated_zero(
         places, heights = [], []
         for share in SHARES:
             made = place.step(np.array([centre + share * width]))
-            height = np.nan if made is None else measure(made[0])
+            height = np.nan if made is None else function(made[0])
             if made is not None and np.isfinite(height):
                 places.append(made[0])
                 heights.append(height)
-        # A measure that takes a value twice does not tell the places apart.
+        # A function that takes a value twice does not tell the places apart.
         if len(places) < 3 or len(set(heights)) < len(heights):
             break
         unknowns = np.array([each.orbit.loop.flat for each in places])

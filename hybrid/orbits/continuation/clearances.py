@@ -20,7 +20,7 @@ PLACES = 129
 SAME = 0.1
 # A guard that is zero at an end of a stretch by its nature has this share of its size there.
 NOTHING = 1e-9
-# Kinds of measures whose places may move along a stretch.
+# Kinds of clearances whose places may move along a stretch.
 MOVING = ("top", "when")
 # Shares by which a stretch is looked at beyond an end where it goes on smoothly.
 BESIDE = 0.05
@@ -28,7 +28,7 @@ BESIDE = 0.05
 
 @attrs.frozen
 class Key:
-    """What a measure belongs to.
+    """What a clearance belongs to.
 
     ``kind`` is ``"speed"`` of the guard that fires at the end of a stretch; ``"top"``, an extremum of a guard
     within the stretch; ``"rate"`` of the guard that fires, along the field of another mode; ``"when"``, a
@@ -45,8 +45,8 @@ class Key:
     part: int = 0
 
 
-def measures(orbit: Pass) -> dict[Key, float]:
-    """All measures of an orbit."""
+def clearances(orbit: Pass) -> dict[Key, float]:
+    """All clearances of an orbit."""
     found: dict[Key, float] = {}
     system, route = orbit.family.system, orbit.family.route
     for i, stretch in enumerate(route):
@@ -238,18 +238,18 @@ def extremum(key: Key, orbit: Pass) -> tuple[float, float]:
     return float(best.x), sign * float(best.fun)
 
 
-def measure_of(key: Key) -> Callable[[Pass], float]:
-    """One measure as a function of the orbit; nan where it has none."""
-    return partial(_MEASURES[key.kind], key)
+def clearance_of(key: Key) -> Callable[[Pass], float]:
+    """One clearance as a function of the orbit; nan where it has none."""
+    return partial(_CLEARANCES[key.kind], key)
 
 
-def curve_measure_of(key: Key) -> Callable[[Pass], float]:
-    """One measure along a curve on which it is zero: its place may move along its stretch."""
-    return partial(_lowest, key) if key.kind in MOVING else measure_of(key)
+def curve_clearance_of(key: Key) -> Callable[[Pass], float]:
+    """One clearance along a curve on which it is zero: its place may move along its stretch."""
+    return partial(_lowest, key) if key.kind in MOVING else clearance_of(key)
 
 
 def _lowest(key: Key, orbit: Pass) -> float:
-    """The measure nearest to zero of those that differ only in their places; nan if there is none."""
+    """The clearance nearest to zero of those that differ only in their places; nan if there is none."""
     found = _of_guard if key.kind == "top" else _of_condition
     each = found(orbit, key.stretch, _transition(orbit, key))
     same = [value for other, value in each if attrs.evolve(other, share=key.share) == key]
@@ -289,7 +289,7 @@ def _transition(orbit: Pass, key: Key) -> Transition:
     return system.transitions[system.transition_index(key.name)]
 
 
-_MEASURES: dict[str, Callable[[Key, Pass], float]] = {
+_CLEARANCES: dict[str, Callable[[Key, Pass], float]] = {
     "top": top,
     "speed": _speed,
     "rate": _rate,
@@ -301,14 +301,14 @@ _MEASURES: dict[str, Callable[[Key, Pass], float]] = {
 
 
 def changed(before: Pass, after: Pass) -> list[Key]:
-    """The measures that have another sign at another orbit, those of touches first.
+    """The clearances that have another sign at another orbit, those of touches first.
 
     A comparison counts if its condition changes.
     """
-    there, here = measures(after), measures(before)
+    there, here = clearances(after), clearances(before)
     found = []
     for key, value in here.items():
-        other = measure_of(key)(after) if key.kind in MOVING else there.get(key, np.nan)
+        other = clearance_of(key)(after) if key.kind in MOVING else there.get(key, np.nan)
         if value * other < 0.0:
             found.append(key)
     order = ("top", "speed", "rate", "when", "end", "begin", "stay")
