@@ -25,6 +25,7 @@ PATHS = {
         "lyapunov",
         "hybrid.testing",
         "hybrid.plot",
+        "hybrid.measures",
         "hybrid.orbits",
         "hybrid.accuracy",
         "hybrid.sweep",

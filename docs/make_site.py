@@ -28,7 +28,10 @@ import models
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
-PACKAGES = ("hybrid", "lyapunov", "models", "hybrid.testing", "hybrid.plot", "lyapunov.plot")
+PACKAGES = (
+    *("hybrid", "lyapunov", "models"),
+    *("hybrid.measures", "hybrid.testing", "hybrid.plot", "lyapunov.plot"),
+)
 # Pages outside this folder, and their names on the site.
 OUTSIDE = {
     "benchmarks/README.md": "measurements.md",

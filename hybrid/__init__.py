@@ -111,9 +111,9 @@ __all__ = [
 ]
 
 
-# Modules that are imported when they are first asked for: they need Matplotlib and Hypothesis. The function
-# explore needs both, and lyapunov.
-ON_DEMAND = ("plot", "testing")
+# Modules that are imported when they are first asked for: plot and testing need Matplotlib and Hypothesis.
+# The function explore needs both, and lyapunov.
+ON_DEMAND = ("measures", "plot", "testing")
 
 
 def __getattr__(name: str) -> Any:

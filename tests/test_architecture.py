@@ -41,6 +41,7 @@ ROOMS = (
     "hybrid.transform",
     "hybrid.compiler",
     "hybrid.simulation",
+    "hybrid.measures",
     "hybrid.orbits",
     "hybrid.plot",
     "hybrid.accuracy",

@@ -16,7 +16,10 @@ MODULES = [
     if not module.name.endswith("__main__")
 ]
 # The packages whose names have a page on the site.
-PACKAGES = ("hybrid", "lyapunov", "models", "hybrid.testing", "hybrid.plot", "lyapunov.plot")
+PACKAGES = (
+    *("hybrid", "lyapunov", "models"),
+    *("hybrid.measures", "hybrid.testing", "hybrid.plot", "lyapunov.plot"),
+)
 
 
 def public_things(package):

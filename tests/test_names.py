@@ -9,7 +9,7 @@ import hybrid
 import hybrid.plot
 import models
 
-PACKAGES = ("hybrid", "lyapunov", "models", "hybrid.testing", "hybrid.plot")
+PACKAGES = ("hybrid", "lyapunov", "models", "hybrid.measures", "hybrid.testing", "hybrid.plot")
 
 
 @pytest.mark.parametrize("package", PACKAGES)

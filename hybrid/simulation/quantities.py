@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
+import attrs
 import numpy as np
 
 from hybrid import arguments
 from hybrid.errors import ArgumentError, ModelError
 from hybrid.expression.derivatives import jacobian_of
 from hybrid.expression.evaluation import Program
-from hybrid.expression.nodes import Expression
 from hybrid.expression.tracing import Symbols, model_symbols, trace
 from hybrid.system.derivatives import COMPLEX_STEP, complex_step_error, evaluate
 from hybrid.system.functions import ModelFunction
@@ -83,13 +83,53 @@ def values_of(
     parameters
         Their values, ``(m,)``, or ``(N, m)`` if they differ from point to point.
     """
-    if name in system.state_names:
-        return x[:, system.state_names.index(name)]
-    found = np.full(len(t), np.nan)
-    for function, rows in _functions(system, name, mode):
-        points = t[rows], x[rows], _rows_of(parameters, rows)
-        found[rows] = _evaluated(system.variables, function, *points)
-    return found
+    return Quantity(system, name)(t, x, mode, parameters)
+
+
+@attrs.frozen(eq=False)
+class Quantity:
+    """A component or an output that is asked for at points again and again: its functions are traced once."""
+
+    system: HybridSystem
+    name: str
+    _programs: dict[int, Program | None] = attrs.field(factory=dict, init=False)
+
+    def __call__(self, t: np.ndarray, x: np.ndarray, mode: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+        """Values ``(N,)`` at points; as ``values_of``."""
+        if self.name in self.system.state_names:
+            return x[:, self.system.state_names.index(self.name)]
+        found = np.full(len(t), np.nan)
+        for function, rows in _functions(self.system, self.name, mode):
+            found[rows] = self._evaluated(function, t[rows], x[rows], _rows_of(parameters, rows))
+        return found
+
+    def has_value_in(self, mode: int) -> bool:
+        """Whether the quantity has a value in a mode, which its index gives."""
+        if self.name in self.system.state_names:
+            return True
+        own = self.system.modes[mode]
+        return self.system.outputs[self.name].in_mode(own.name, own.part_of) is not None
+
+    def _evaluated(
+        self, function: Callable[..., Any], t: np.ndarray, x: np.ndarray, parameters: np.ndarray
+    ) -> np.ndarray:
+        """Values ``(N,)`` of a function: at all points at once if it can be traced, else point by point."""
+        variables = self.system.variables
+        if id(function) not in self._programs:
+            try:
+                traced = trace(function, variables.components, variables.parameter_names)
+            except ModelError:
+                self._programs[id(function)] = None
+            else:
+                self._programs[id(function)] = Program(traced)
+        program = self._programs[id(function)]
+        if program is not None:
+            return _run(variables, program, t, x, parameters)[:, 0]
+        vectors = np.broadcast_to(parameters, (len(t), parameters.shape[-1]))
+        values = [
+            evaluate(variables, function, *point, finite=False) for point in zip(t, x, vectors, strict=True)
+        ]
+        return np.array([np.nan if each is None else each[0] for each in values], dtype=float)
 
 
 def table_of(
@@ -145,33 +185,14 @@ def _rows_of(parameters: np.ndarray, rows: np.ndarray) -> np.ndarray:
     return parameters if parameters.ndim == 1 else parameters[rows]
 
 
-def _evaluated(
-    variables: Variables, function: Callable[..., Any], t: np.ndarray, x: np.ndarray, parameters: np.ndarray
-) -> np.ndarray:
-    """Values ``(N,)`` of a function: at all points at once if it can be traced, else point by point."""
-    try:
-        expressions = trace(function, variables.components, variables.parameter_names)
-    except ModelError:
-        vectors = np.broadcast_to(parameters, (len(t), parameters.shape[-1]))
-        found = [
-            evaluate(variables, function, *point, finite=False) for point in zip(t, x, vectors, strict=True)
-        ]
-        return np.array([np.nan if each is None else each[0] for each in found], dtype=float)
-    return _run(variables, expressions, t, x, parameters)[:, 0]
-
-
 def _run(
-    variables: Variables,
-    expressions: Sequence[Expression],
-    t: np.ndarray,
-    x: np.ndarray,
-    parameters: np.ndarray,
+    variables: Variables, program: Program, t: np.ndarray, x: np.ndarray, parameters: np.ndarray
 ) -> np.ndarray:
-    """Values ``(N, len(expressions))`` of expressions at all points."""
+    """Values ``(N, k)`` of the expressions of a program at all points."""
     symbols = _symbols(variables)
     known = dict(zip((symbols.t, *symbols.x, *symbols.p), (t, *x.T, *parameters.T), strict=True))
     with np.errstate(all="ignore"):
-        columns = Program(expressions).run(known)
+        columns = program.run(known)
     return np.column_stack([np.broadcast_to(np.asarray(each, dtype=float), t.shape) for each in columns])
 
 
@@ -196,7 +217,7 @@ def _slopes(
         )
     symbols = _symbols(variables)
     [row] = jacobian_of(expressions, [*symbols.x, *symbols.p])
-    return _run(variables, row, t, x, parameters)
+    return _run(variables, Program(row), t, x, parameters)
 
 
 def _check_complex(variables: Variables, name: str, function: Callable[..., Any], why: Exception) -> None:
