@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -11,11 +11,13 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.display.tables import counted
+from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.change import Change
+from hybrid.orbits.continuation.event import KINDS
 from hybrid.orbits.continuation.labelled import dataset_of
 from hybrid.orbits.continuation.place import Place
 from hybrid.orbits.orbit import PeriodicOrbit
-from hybrid.simulation.quantities import Asked, mode_indices, table_of
+from hybrid.simulation.quantities import Asked, mode_indices, quantity, table_of
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
 
@@ -37,6 +39,7 @@ class Bifurcation:
         reached), ``"border"`` (the same, and the orbit is in some mode on one side alone),
         ``"crossing-sliding"``, ``"grazing-sliding"``, ``"switching-sliding"``,
         ``"adding-sliding"``.
+        A zero of a function in ``events=`` has its name.
     parameter, value
         Name of the parameter, and its value there.
     orbit
@@ -51,6 +54,10 @@ class Bifurcation:
         Of a grazing with a jump of finite size, the vector ``C (n,)`` of the zero-time discontinuity map: an
         orbit that would go beyond the guard by ``H`` is moved by ``C sqrt(H)`` where it would be farthest
         (Nordmark 1991). None for other kinds.
+    position
+        How many orbits of the branch come before it.
+    outputs
+        What the functions in ``outputs=`` make of the orbit, by name; nan where the orbit is too singular.
 
     Examples
     --------
@@ -68,6 +75,8 @@ class Bifurcation:
     message: str
     stable: tuple[bool | None, bool | None]
     coefficient: np.ndarray | float | None = None
+    position: int = 0
+    outputs: Mapping[str, float] = attrs.field(factory=dict)
     _place: Place | None = attrs.field(default=None, repr=False)
     _change: Change | None = attrs.field(default=None, repr=False)
 
@@ -79,7 +88,8 @@ class Bifurcation:
 class Branch(Asked):
     """Periodic orbits in order along a branch; the sequence of transitions may change at its bifurcations.
 
-    ``branch["q"]`` is a component of the orbits' points, or an output at them.
+    ``branch["q"]`` is a component of the orbits' points, or an output at them; ``branch["peak"]`` is what a
+    function in ``outputs=`` of :func:`hybrid.continue_orbit` makes of the orbits.
 
     Attributes
     ----------
@@ -101,6 +111,12 @@ class Branch(Asked):
         Each :class:`Bifurcation`, in order along the branch.
     status
         Why the branch ends where it does.
+    outputs
+        Values ``(N,)`` of the functions in ``outputs=``, by name.
+    output_units
+        Units of these as far as they are known, by name.
+    events
+        Names of the functions in ``events=``.
 
     Examples
     --------
@@ -124,7 +140,50 @@ class Branch(Asked):
     stable: np.ndarray
     bifurcations: tuple[Bifurcation, ...]
     status: Status
+    outputs: Mapping[str, np.ndarray]
+    output_units: Mapping[str, str]
+    events: tuple[str, ...]
     _orbit: Callable[[int], PeriodicOrbit]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A component of the state or an output at the points, or one of ``outputs``, ``(N,)``.
+
+        Raises
+        ------
+        ArgumentError
+            If there is none of that name.
+        """
+        return self._table([self.quantity("", name)])[:, 0]
+
+    def quantity(self, title: str, name: object) -> str:
+        """The name of what the branch can be asked for, or an ArgumentError that begins with ``title``."""
+        if isinstance(name, str) and name in self.outputs:
+            return name
+        if not self.outputs:
+            return quantity(title, name, self.system)
+        allowed = [*self.system.quantity_names, *self.outputs]
+        return arguments.known(f"{title}Component or output", name, allowed, "Components and outputs")
+
+    def of(self, *kinds: str) -> tuple[Bifurcation, ...]:
+        """The bifurcations of one kind or of several, in order along the branch.
+
+        Parameters
+        ----------
+        *kinds
+            Such as ``"flip"``, or names of functions in ``events=``.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no such kind.
+        """
+        if not kinds:
+            raise ArgumentError(f"kinds must name one kind or several; allowed are {', '.join(KINDS)}.")
+        there = ", ".join(dict.fromkeys(each.kind for each in self.bifurcations)) or "none"
+        allowed = (*KINDS, *self.events)
+        for kind in kinds:
+            arguments.known("kinds: Kind", kind, allowed, f"On this branch: {there}. Kinds")
+        return tuple(each for each in self.bifurcations if each.kind in kinds)
 
     @cached_property
     def orbits(self) -> tuple[PeriodicOrbit, ...]:
@@ -160,7 +219,11 @@ class Branch(Asked):
         values = np.tile(own, (len(self), 1))
         values[:, [*self.system.parameters].index(self.name)] = self.parameter
         modes = mode_indices(self.system, self.mode)
-        return table_of(self.system, [*names], self.t0, self.x0, modes, values)
+        names = [*names]
+        own_names = [name for name in names if name not in self.outputs]
+        table = table_of(self.system, own_names, self.t0, self.x0, modes, values)
+        columns = {**dict(zip(own_names, table.T, strict=True)), **self.outputs}
+        return np.column_stack([columns[name] for name in names]) if names else table
 
     def __repr__(self) -> str:
         values = self.parameter
@@ -171,7 +234,9 @@ class Branch(Asked):
     def to_xarray(self) -> xarray.Dataset:
         """The branch over the axis ``point``, with the parameter as a coordinate, and its bifurcations.
 
-        If the system has outputs they are in ``outputs`` (axes ``point`` and ``output``).
+        If the system has outputs they are in ``outputs`` (axes ``point`` and ``output``). Each function in
+        ``outputs=`` has a variable of its name over ``point``, and one over ``bifurcation`` with ``_there``
+        behind the name.
 
         Multipliers are complex: ``.to_zarr`` saves them, netCDF cannot. :func:`hybrid.open_branch` makes a
         branch of it again.

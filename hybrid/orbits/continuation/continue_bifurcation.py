@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -16,9 +16,11 @@ from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation
 from hybrid.orbits.continuation.clearances import curve_clearance_of
 from hybrid.orbits.continuation.curve import SMOOTH, Curve, Special, Spot, along_curve
+from hybrid.orbits.continuation.event import KINDS
 from hybrid.orbits.continuation.place import Place, place_of, place_on
 from hybrid.orbits.continuation.result import Points, orbit_of, whole_orbit_of
 from hybrid.orbits.continuation.route import Loop
+from hybrid.orbits.continuation.watch import OfArc, Unmeasured, Watch, checked_outputs, units_of
 from hybrid.orbits.orbit import PeriodicOrbit, unaged
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names, attributes
@@ -40,6 +42,7 @@ ENDS = {
     "strong resonance": "a strong resonance, where the pair of multipliers becomes real",
     "most": "the limit of steps",
     "lost": "a place beyond which Newton's method finds no point",
+    "unmeasured": "an orbit that a function fails on",
 }
 
 
@@ -82,6 +85,9 @@ class CodimensionTwo:
 class BifurcationCurve:
     """A bifurcation over two parameters; ``curve["omega"]`` are the values of one.
 
+    ``curve["peak"]`` is what a function in ``outputs=`` of :func:`hybrid.continue_bifurcation` makes of the
+    orbits.
+
     Attributes
     ----------
     system, kind, names
@@ -94,6 +100,10 @@ class BifurcationCurve:
         Each :class:`hybrid.CodimensionTwo` on the curve, in order.
     status
         Why the curve ends where it does.
+    outputs
+        Values ``(N,)`` of the functions in ``outputs=``, by name.
+    output_units
+        Units of these as far as they are known, by name.
 
     Examples
     --------
@@ -117,10 +127,17 @@ class BifurcationCurve:
     multipliers: np.ndarray
     points: tuple[CodimensionTwo, ...]
     status: Status
+    outputs: Mapping[str, np.ndarray]
+    output_units: Mapping[str, str]
     _orbits: tuple[PeriodicOrbit, ...]
 
     def __getitem__(self, name: str) -> np.ndarray:
-        arguments.known("curve: Parameter", name, self.names, "Parameters")
+        if isinstance(name, str) and name in self.outputs:
+            return self.outputs[name]
+        what, kind = "curve: Parameter", "Parameters"
+        if self.outputs:
+            what, kind = "curve: Parameter or output", "Parameters and outputs"
+        arguments.known(what, name, (*self.names, *self.outputs), kind)
         return self.values[:, self.names.index(name)]
 
     def __len__(self) -> int:
@@ -143,16 +160,22 @@ class BifurcationCurve:
         return self._orbits[arguments.index("i", i, len(self))]
 
     def to_xarray(self) -> xarray.Dataset:
-        """The curve over the axis ``point``, with both parameters as coordinates."""
+        """The curve over the axis ``point``, with both parameters as coordinates.
+
+        Each function in ``outputs=`` has a variable of its name.
+        """
         import xarray
 
         names = Names(self.system.state_names, self.system.units)
-        variables = {
+        variables: dict[str, Any] = {
             "x0": (("point", "state"), self.x0, names.states),
             "mode": ("point", self.mode.astype(str)),
             "period": ("point", self.period, names.of("t")),
             "multipliers": (("point", "multiplier"), self.multipliers.astype(complex)),
         }
+        for name, found in self.outputs.items():
+            unit = {"units": self.output_units[name]} if name in self.output_units else {}
+            variables[name] = ("point", found, unit)
         coords = {name: ("point", self[name], names.of(name)) for name in self.names}
         made_by = attributes(f"curve of {PLURALS.get(self.kind, f'{self.kind}s')}", self.status, self.system)
         return xarray.Dataset(variables, {**coords, **names.coords()}, made_by)
@@ -162,6 +185,7 @@ def continue_bifurcation(
     bifurcation: Bifurcation,
     over: Mapping[str, tuple[float, float]],
     *,
+    outputs: Mapping[str, OfArc] | None = None,
     solver: Solver | None = None,
     max_steps: int = 500,
     progress: bool | None = None,
@@ -175,9 +199,12 @@ def continue_bifurcation(
     Parameters
     ----------
     bifurcation
-        Of a `Branch`: any kind but a branch point, which two parameters do not keep.
+        Of a `Branch`: any kind but a branch point, which two parameters do not keep, and zeros of functions
+        in ``events=``.
     over
         Names of two parameters with their ranges: ``{"omega": (6.5, 8.5), "P": (300.0, 700.0)}``.
+    outputs
+        Functions of an arc, by name, as of :func:`hybrid.continue_orbit`.
     solver
         Method and tolerances, by default ``Taylor(rtol=1e-12, atol=1e-14)``.
     max_steps
@@ -193,8 +220,8 @@ def continue_bifurcation(
     Raises
     ------
     ArgumentError
-        If the bifurcation is a branch point, a parameter does not exist, or a range does not contain its
-        value.
+        If the bifurcation has no curve, a parameter does not exist, a range does not contain its value, or a
+        function in ``outputs`` gives no finite number for the orbit.
 
     References
     ----------
@@ -217,16 +244,29 @@ def continue_bifurcation(
     most = arguments.count("max_steps", max_steps, 1)
     progress = None if progress is None else arguments.flag("progress", progress)
     method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
+    measured = checked_outputs(outputs, bifurcation.orbit.system)
+    watch = Watch(method, Points(bifurcation.orbit.t0), measured)
     place = _start(bifurcation, names, highs - lows, method)
     curve = _curve_of(bifurcation, place)
     begin = curve.begin(place)
     if begin is None:
         raise ArgumentError(f"the {bifurcation.kind} is not found again over {names[0]} and {names[1]}.")
     with CTRL_C, progress_bar(None, "Curve", progress, "point") as bar:
-        items, why = _both_ways(curve, begin, lows, highs, most, bar)
+        found = _Found([begin], {begin: watch.outputs_of(begin.place.orbit)})
+        _both_ways(curve, (lows, highs), most, watch, found, bar)
         interrupted = CTRL_C.is_set()
-    status = interrupted_status("the points so far") if interrupted else _status(why)
-    return _result(items, bifurcation, names, status)
+    status = interrupted_status("the points so far") if interrupted else _status(found)
+    return _result(found, bifurcation, names, status, watch)
+
+
+@attrs.define(eq=False)
+class _Found:
+    """What has been found of a curve: its items in order, outputs of its spots, why it ends, what failed."""
+
+    items: list[Spot | Special]
+    outputs: dict[Spot, dict[str, float]]
+    why: list[str] = attrs.field(factory=list)
+    failures: list[str] = attrs.field(factory=list)
 
 
 def _ranges(bifurcation: Bifurcation, over: object) -> tuple[tuple[str, str], np.ndarray, np.ndarray]:
@@ -253,6 +293,11 @@ def _start(bifurcation: Bifurcation, names: tuple[str, str], sizes: np.ndarray, 
         raise ArgumentError(
             "bifurcation is a branch point, which goes away when another parameter changes; allowed are the "
             "other kinds."
+        )
+    if bifurcation.kind not in KINDS:
+        raise ArgumentError(
+            f"bifurcation is a zero of events[{bifurcation.kind!r}], which has no curve over two parameters; "
+            f"allowed are {', '.join(kind for kind in KINDS if kind != 'branch point')}."
         )
     known = bifurcation._place
     if known is None:
@@ -286,31 +331,41 @@ def _curve_of(bifurcation: Bifurcation, place: Place) -> Curve:
 
 
 def _both_ways(
-    curve: Curve, begin: Spot, lows: np.ndarray, highs: np.ndarray, most: int, bar: Progress
-) -> tuple[list[Spot | Special], list[str]]:
-    items: list[Spot | Special] = [begin]
-    why: list[str] = []
+    curve: Curve,
+    ranges: tuple[np.ndarray, np.ndarray],
+    most: int,
+    watch: Watch,
+    found: _Found,
+    bar: Progress,
+) -> None:
+    [begin] = found.outputs
     for sign in (-1.0, 1.0):
-        items = items[::-1]
+        found.items = found.items[::-1]
+        start = attrs.evolve(begin, way=sign * begin.way)
         with CTRL_C.ending():
-            for item in along_curve(curve, attrs.evolve(begin, way=sign * begin.way), lows, highs, most):
-                if isinstance(item, str):
-                    why.append(item)
-                    break
-                items.append(item)
-                bar.update(isinstance(item, Spot))
-                if CTRL_C.is_set():
-                    break
-        if CTRL_C.is_set() or why[-1] == "closed":
+            try:
+                for item in along_curve(curve, start, *ranges, most):
+                    if isinstance(item, str):
+                        found.why.append(item)
+                        break
+                    if isinstance(item, Spot):
+                        found.outputs[item] = watch.outputs_of(item.place.orbit)
+                    found.items.append(item)
+                    bar.update(isinstance(item, Spot))
+                    if CTRL_C.is_set():
+                        break
+            except Unmeasured as error:
+                found.why.append("unmeasured")
+                found.failures.append(str(error))
+        if CTRL_C.is_set() or found.why[-1] == "closed":
             break
-    return items, why
 
 
 def _result(
-    items: list[Spot | Special], bifurcation: Bifurcation, names: tuple[str, str], status: Status
+    found: _Found, bifurcation: Bifurcation, names: tuple[str, str], status: Status, watch: Watch
 ) -> BifurcationCurve:
-    points = Points(bifurcation.orbit.t0)
-    spots = [item for item in items if isinstance(item, Spot)]
+    points = watch.points
+    spots = [item for item in found.items if isinstance(item, Spot)]
     orbits = tuple(unaged([whole_orbit_of(each.place.orbit, points) for each in spots]))
     special = tuple(
         CodimensionTwo(
@@ -319,7 +374,7 @@ def _result(
             orbit_of(item.spot.place.orbit, points),
             item.message,
         )
-        for item in items
+        for item in found.items
         if isinstance(item, Special)
     )
     return BifurcationCurve(
@@ -333,16 +388,17 @@ def _result(
         multipliers=np.array([orbit.multipliers for orbit in orbits]),
         points=special,
         status=status,
+        outputs={name: np.array([found.outputs[spot][name] for spot in spots]) for name in watch.outputs},
+        output_units=units_of(watch.outputs, orbits[0].system),
         orbits=orbits,
     )
 
 
-def _status(why: list[str]) -> Status:
-    told = " and at ".join(ENDS[each] for each in dict.fromkeys(why))
-    if not {"lost", "most"} & set(why):
-        return attrs.evolve(SUCCESS, message=f"The curve ends at {told}.")
-    return Status(
-        StatusCode.NOT_CONVERGED,
-        f"The curve ends at {told}.",
-        "Tighten the tolerances of solver=, or raise max_steps.",
-    )
+def _status(found: _Found) -> Status:
+    told = " and at ".join(ENDS[each] for each in dict.fromkeys(found.why))
+    message = " ".join([f"The curve ends at {told}.", *found.failures])
+    if found.failures:
+        return Status(StatusCode.FAILED, message, "Correct the function, or end the ranges there.")
+    if not {"lost", "most"} & set(found.why):
+        return attrs.evolve(SUCCESS, message=message)
+    return Status(StatusCode.NOT_CONVERGED, message, "Tighten the tolerances of solver=, or raise max_steps.")

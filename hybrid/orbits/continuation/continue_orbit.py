@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
 
 import attrs
 import numpy as np
@@ -13,10 +14,21 @@ from hybrid.display.progress import Progress, progress_bar
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
 from hybrid.orbits.continuation.crossing import crossing, flip_coefficient, fold_coefficient, is_supercritical
+from hybrid.orbits.continuation.event import KINDS, Event
+from hybrid.orbits.continuation.monitors import Monitors
 from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import Place, moment, place_on, share_of
 from hybrid.orbits.continuation.result import Points, mode_at, whole_orbit_of
-from hybrid.orbits.continuation.walk import Event, walk
+from hybrid.orbits.continuation.walk import walk
+from hybrid.orbits.continuation.watch import (
+    OfArc,
+    Unmeasured,
+    Watch,
+    checked_events,
+    checked_outputs,
+    checked_stop,
+    units_of,
+)
 from hybrid.orbits.orbit import PeriodicOrbit, unaged
 from hybrid.orbits.sensitivity import is_isolated
 from hybrid.simulation.interrupt import interrupted_status
@@ -28,6 +40,8 @@ from hybrid.transform.aged import original_of
 from hybrid.transform.edges import switches
 
 Item = Place | Event
+# What the functions of a caller make of places.
+Outputs = dict[Place, dict[str, float]]
 
 # A multiplier is -1 if it is this near.
 AT_MINUS_ONE = 1e-3
@@ -45,7 +59,11 @@ ENDS = {
     "family": "orbits that all have one value of the parameter",
     "most": "the limit of steps",
     "lost": "an orbit beyond which Newton's method finds none",
+    "stop": "an orbit at which stop= is true",
+    "unmeasured": "an orbit that a function fails on",
 }
+# A walk that ends where stop= names a kind says so with this before it.
+STOPPED = "stop: "
 
 MANY = (
     "A multiplier is 1, so there are other orbits beside each: the one that is nearest to the orbit before "
@@ -59,6 +77,9 @@ def continue_orbit(
     parameter: str,
     span: tuple[float, float],
     *,
+    outputs: Mapping[str, OfArc] | None = None,
+    events: Mapping[str, OfArc] | None = None,
+    stop: str | Iterable[str] | Callable[[PeriodicOrbit], Any] | None = None,
     solver: Solver | None = None,
     max_steps: int = 2000,
     progress: bool | None = None,
@@ -83,6 +104,17 @@ def continue_orbit(
         Name of the parameter.
     span
         ``(low, high)``, which contains the value of the orbit.
+    outputs
+        Functions of an arc, by name, such as ``{"peak": hybrid.measures.maximum("x")}``. Each is called with
+        a run once around every orbit and returns a number; ``branch["peak"]`` are these numbers.
+    events
+        Functions of an arc, by name. Where one changes its sign along the branch its zero is located, as a
+        bifurcation of that kind: ``{"limit": lambda arc: hybrid.measures.maximum("x")(arc) - 2.0}``. Values
+        below 1e-11, or 1e-11 of the largest one, count as zero, which has no sign.
+    stop
+        Where the branch ends, either way: at the first bifurcation of a kind or of one of several kinds,
+        ``"fold"``, which ``events=`` may have named, or at the first orbit beyond this one at which a
+        function of an orbit is true.
     solver
         Method and tolerances, by default ``Taylor(rtol=1e-12, atol=1e-14)``.
     max_steps
@@ -91,12 +123,16 @@ def continue_orbit(
     Returns
     -------
     Branch
-        With a status; if it is interrupted or lost it keeps what there is.
+        With a status; if it is interrupted or lost it keeps what there is. So it does if a function raises
+        an error, or gives no finite number, for a later orbit: the branch ends before that orbit, and the
+        status says which it is.
 
     Raises
     ------
     ArgumentError
-        If the orbit has not converged, the parameter does not exist, or the span does not contain its value.
+        If the orbit has not converged, the parameter does not exist, or the span does not contain its value;
+        if a function in ``outputs`` or ``events`` gives no finite number for the orbit; if ``stop`` names a
+        kind that there is not.
 
     References
     ----------
@@ -115,6 +151,15 @@ def continue_orbit(
     >>> branch = continue_orbit(orbit, "w", (0.9, 1.1))
     >>> branch.status.ok
     True
+
+    The largest speed over the frequency, up to where it is 1.8:
+
+    >>> from hybrid.measures import maximum
+    >>> speed = maximum("v")
+    >>> fast = {"fast": lambda arc: speed(arc) - 1.8}
+    >>> branch = continue_orbit(orbit, "w", (0.9, 1.8), outputs={"speed": speed}, events=fast, stop="fast")
+    >>> [round(each.outputs["speed"], 9) for each in branch.of("fast")]
+    [1.8]
     """
     arguments.instance("orbit", orbit, PeriodicOrbit, "Call periodic_orbit first.")
     if not orbit.closes:
@@ -133,8 +178,13 @@ def continue_orbit(
     most = arguments.count("max_steps", max_steps, 1)
     progress = None if progress is None else arguments.flag("progress", progress)
     method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
+    located = checked_events(events)
+    kinds, stops = checked_stop(stop, located)
+    measured = checked_outputs(outputs, orbit.system)
+    begin = place_on(orbit, (parameter,), np.array([high - low]), method)
+    watch = Watch(method, points_of(orbit, begin), measured, located, kinds, stops)
     with CTRL_C, progress_bar(None, "Branch", progress, "orbit") as bar:
-        found, why, notes, advice = _branch(orbit, parameter, low, high, method, most, bar)
+        found, why, notes, advice = _branch(begin, low, high, most, watch, bar)
         if CTRL_C.is_set():
             return attrs.evolve(found, status=interrupted_status("the orbits so far"))
     status = _status(why, advice)
@@ -145,17 +195,23 @@ def continue_orbit(
 
 
 def _branch(
-    orbit: PeriodicOrbit, name: str, low: float, high: float, solver: Solver, most: int, bar: Progress
+    begin: Place, low: float, high: float, most: int, watch: Watch, bar: Progress
 ) -> tuple[Branch, list[str], list[str], str]:
-    """The branch both ways, why it ends, what is to be noted of its first orbit, and advice if it is lost."""
-    begin = place_on(orbit, (name,), np.array([high - low]), solver)
-    points = points_of(orbit, begin)
+    """The branch both ways, why it ends, what is to be noted of it, and advice if it is lost."""
     items: list[Item] = [begin]
-    why: list[str] = []
+    outputs = {begin: watch.outputs_of(begin.orbit)}
+    monitors = Monitors(watch)
+    monitors.start(begin)
+    why, failures = list[str](), list[str]()
     advice = ""
     for sign in (-1.0, 1.0):
         items = items[::-1]
-        why.append(_walked(attrs.evolve(begin, tangents=sign * begin.tangents), low, high, most, items, bar))
+        start = attrs.evolve(begin, tangents=sign * begin.tangents)
+        try:
+            why.append(_walked(walk(start, low, high, most, monitors), items, outputs, watch, bar))
+        except Unmeasured as error:
+            why.append("unmeasured")
+            failures.append(str(error))
         if why[-1] == "lost":
             advice = _advice(next(item for item in reversed(items) if isinstance(item, Place)))
         if why[-1] in ("closed", "interrupted"):
@@ -163,10 +219,10 @@ def _branch(
     held = begin.family.held
     places = [item for item in items if isinstance(item, Place)]
     told = "" if all(place.family.held is not None for place in places) else ", where the jumps keep it"
-    notes = [] if held is None else [f"Held as at the start{told}: {held.told}."]
+    notes = failures if held is None else [*failures, f"Held as at the start{told}: {held.told}."]
     if _is_one_of_many(begin):
-        notes += [MANY, NOTHING_HELD] if held is None else [MANY]
-    return branch_of(items, points), why, notes, advice
+        notes = [*notes, MANY, NOTHING_HELD] if held is None else [*notes, MANY]
+    return branch_of(items, outputs, watch), why, notes, advice
 
 
 def _advice(place: Place) -> str:
@@ -190,23 +246,31 @@ def _is_one_of_many(place: Place) -> bool:
     return bool(np.any(ones)) and not is_isolated(place)
 
 
-def _walked(begin: Place, low: float, high: float, most: int, items: list[Item], bar: Progress) -> str:
-    """Walk from a place; what is met goes to the items. Returns why the walk ends."""
+def _walked(
+    found: Iterator[Item | str], items: list[Item], outputs: Outputs, watch: Watch, bar: Progress
+) -> str:
+    """Take a walk; what is met goes to the items, with its outputs. Returns why the walk ends."""
     with CTRL_C.ending():
-        for item in walk(begin, low, high, most):
+        for item in found:
             if isinstance(item, str):
                 return item
+            if isinstance(item, Place):
+                outputs[item] = watch.outputs_of(item.orbit)
             items.append(item)
             bar.update(isinstance(item, Place))
+            if isinstance(item, Event) and item.kind in watch.kinds:
+                return f"{STOPPED}{item.kind}"
+            if isinstance(item, Place) and watch.is_last(item.orbit):
+                return "stop"
             if CTRL_C.is_set():
                 break
     return "interrupted"
 
 
-def branch_of(items: list[Item], points: Points) -> Branch:
+def branch_of(items: list[Item], outputs: Outputs, watch: Watch) -> Branch:
     """The branch through places and events, in order."""
     places = [item for item in items if isinstance(item, Place)]
-    passes = [place.orbit for place in places]
+    passes, points = [place.orbit for place in places], watch.points
     family = passes[0].family
     where = [points.at(each) for each in passes]
     stable = {id(place): place.orbit.stable for place in places}
@@ -222,11 +286,14 @@ def branch_of(items: list[Item], points: Points) -> Branch:
         multipliers=np.array([each.multipliers for each in passes]),
         stable=np.array([stable[id(place)] for place in places]),
         bifurcations=tuple(
-            bifurcation_of(item, _sides(items, i, stable), points)
+            bifurcation_of(item, _beside(items, i, stable), watch)
             for i, item in enumerate(items)
             if isinstance(item, Event)
         ),
         status=SUCCESS,
+        outputs={name: np.array([outputs[place][name] for place in places]) for name in watch.outputs},
+        output_units=units_of(watch.outputs, family.system),
+        events=tuple(watch.events),
         orbit=_OrbitOf(passes, points),
     )
     return _unaged(branch)
@@ -277,13 +344,20 @@ def _without_component(bifurcation: Bifurcation, age: int) -> Bifurcation:
     return attrs.evolve(bifurcation, orbit=unaged([bifurcation.orbit])[0], coefficient=coefficient)
 
 
-def _sides(items: list[Item], i: int, stable: dict[int, bool]) -> tuple[bool | None, bool | None]:
-    """Whether the orbits before and after an item are stable; None at an end of the branch."""
-    sides = []
-    for part in (items[:i][::-1], items[i + 1 :]):
-        near = next((each for each in part if isinstance(each, Place)), None)
-        sides.append(None if near is None else stable[id(near)])
-    return sides[0], sides[1]
+@attrs.frozen
+class Beside:
+    """What is beside a bifurcation on a branch: how many places come before, and which sides are stable."""
+
+    position: int
+    stable: tuple[bool | None, bool | None]
+
+
+def _beside(items: list[Item], i: int, stable: dict[int, bool]) -> Beside:
+    """The places before and after an item; at an end of the branch no side is stable or unstable."""
+    parts = items[:i], items[i + 1 :]
+    before, after = ([each for each in part if isinstance(each, Place)] for part in parts)
+    sides = (stable[id(before[-1])] if before else None, stable[id(after[0])] if after else None)
+    return Beside(len(before), sides)
 
 
 def points_of(orbit: PeriodicOrbit, place: Place) -> Points:
@@ -294,8 +368,9 @@ def points_of(orbit: PeriodicOrbit, place: Place) -> Points:
     return points
 
 
-def bifurcation_of(event: Event, stable: tuple[bool | None, bool | None], points: Points) -> Bifurcation:
+def bifurcation_of(event: Event, beside: Beside, watch: Watch) -> Bifurcation:
     """An event as a result."""
+    points = watch.points
     place = event.place if event.change is None else event.change.exact.place
     orbit = whole_orbit_of(place.orbit, points)
     if event.change is not None and not np.all(np.isfinite(orbit.fundamental)):
@@ -314,8 +389,10 @@ def bifurcation_of(event: Event, stable: tuple[bool | None, bool | None], points
         place.value,
         orbit,
         event.message + further,
-        stable,
+        beside.stable,
         coefficient,
+        beside.position,
+        watch.outputs_near(place.orbit),
         place,
         event.change,
     )
@@ -347,11 +424,20 @@ def _side(coefficient: float) -> str:
 
 
 def _status(why: list[str], advice: str) -> Status:
-    told = " and at ".join(ENDS.get(each, _a(each)) for each in dict.fromkeys(why))
+    told = " and at ".join(map(_told, dict.fromkeys(why)))
+    message = f"The branch ends at {told}."
+    if "unmeasured" in why:
+        return Status(StatusCode.FAILED, message, "Correct the function, or end the span before that orbit.")
     if not {"lost", "most"} & set(why):
-        return attrs.evolve(SUCCESS, message=f"The branch ends at {told}.")
+        return attrs.evolve(SUCCESS, message=message)
     return Status(
-        StatusCode.NOT_CONVERGED,
-        f"The branch ends at {told}.",
-        advice or "Raise max_steps, or continue from the last orbit.",
+        StatusCode.NOT_CONVERGED, message, advice or "Raise max_steps, or continue from the last orbit."
     )
+
+
+def _told(why: str) -> str:
+    """Why a walk ends, in words."""
+    if why.startswith(STOPPED):
+        kind = why.removeprefix(STOPPED)
+        return f"{_a(kind) if kind in KINDS else f'a zero of events[{kind!r}]'}, which stop= names"
+    return ENDS.get(why, _a(why))

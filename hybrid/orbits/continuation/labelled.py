@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     import xarray
 
 KIND = "branch"
+# What variables at the bifurcations have behind their names.
+THERE = "_there"
 # Whether orbits beside a bifurcation are stable, as numbers.
 SIDES = {None: -1, False: 0, True: 1}
 
@@ -52,10 +55,17 @@ def dataset_of(branch: Any) -> xarray.Dataset:
             ("bifurcation", "multiplier"),
             np.array([each.multipliers for each in orbits], dtype=complex).reshape(-1, directions),
         ),
+        "position": ("bifurcation", np.array([each.position for each in found], dtype=int)),
     }
+    for name, values in branch.outputs.items():
+        unit = {"units": branch.output_units[name]} if name in branch.output_units else {}
+        variables[name] = ("point", values, unit)
+        there = np.array([each.outputs[name] for each in found], dtype=float)
+        variables[f"{name}{THERE}"] = ("bifurcation", there, unit)
     coords = {branch.name: ("point", branch.parameter, names.of(branch.name)), **names.coords()}
     made_by = attributes(KIND, branch.status, branch.system, branch.orbit(0).parameters)
-    made = xarray.Dataset(variables, coords, {**made_by, "parameter": branch.name})
+    asked = {"measured": json.dumps([*branch.outputs]), "events": json.dumps([*branch.events])}
+    made = xarray.Dataset(variables, coords, {**made_by, "parameter": branch.name, **asked})
     tables = {
         "outputs": ("point", branch._table(branch.system.outputs)),
         "outputs_there": ("bifurcation", table_at(branch.system, [*branch.system.outputs], orbits)),

@@ -14,7 +14,7 @@ import numpy as np
 from hybrid import arguments
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
-from hybrid.orbits.continuation.labelled import KIND, SIDES
+from hybrid.orbits.continuation.labelled import KIND, SIDES, THERE
 from hybrid.orbits.orbit import PeriodicOrbit, turns_over
 from hybrid.simulation.seal import check_seal, read_file, read_folder
 from hybrid.simulation.simulate import simulate
@@ -80,6 +80,7 @@ def open_branch(system: HybridSystem, saved: xarray.Dataset | str | os.PathLike[
         )
     name = str(saved.attrs["parameter"])
     known = json.loads(saved.attrs["model_parameters"])
+    measured = json.loads(saved.attrs["measured"])
     return Branch(
         system=system,
         name=name,
@@ -91,10 +92,13 @@ def open_branch(system: HybridSystem, saved: xarray.Dataset | str | os.PathLike[
         multipliers=saved.multipliers.values,
         stable=saved.stable.values,
         bifurcations=tuple(
-            _bifurcation(system, known, name, saved.isel(bifurcation=i))
+            _bifurcation(system, known, name, saved.isel(bifurcation=i), measured)
             for i in range(saved.sizes["bifurcation"])
         ),
         status=Status(StatusCode[saved.attrs["status"]], saved.attrs["message"]),
+        outputs={each: saved[each].values for each in measured},
+        output_units={each: saved[each].attrs["units"] for each in measured if "units" in saved[each].attrs},
+        events=tuple(json.loads(saved.attrs["events"])),
         orbit=_SavedOrbit(system, known, name, saved),
     )
 
@@ -114,7 +118,7 @@ class _SavedOrbit:
 
 
 def _bifurcation(
-    system: HybridSystem, known: Mapping[str, float], name: str, row: xarray.Dataset
+    system: HybridSystem, known: Mapping[str, float], name: str, row: xarray.Dataset, measured: list[str]
 ) -> Bifurcation:
     value = float(row["value"])
     stable = [next(key for key, number in SIDES.items() if number == int(side)) for side in row.stable_beside]
@@ -125,6 +129,8 @@ def _bifurcation(
         orbit=_orbit(system, {**known, name: value}, row, "_there"),
         message=str(row["message"].values),
         stable=(stable[0], stable[1]),
+        position=int(row["position"]),
+        outputs={each: float(row[f"{each}{THERE}"]) for each in measured},
     )
 
 

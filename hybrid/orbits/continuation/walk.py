@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import attrs
 import numpy as np
 
-from hybrid.orbits.continuation.change import Change, located
+from hybrid.orbits.continuation.change import located
+from hybrid.orbits.continuation.event import Event
 from hybrid.orbits.continuation.instants import SAME, halves, passes_by
+from hybrid.orbits.continuation.monitors import Monitors
 from hybrid.orbits.continuation.place import (
     SHORTEST_STEP,
     Place,
@@ -46,18 +47,11 @@ AHEAD = 1e-4
 SAME_CHANGE = 1e-7
 
 
-@attrs.frozen(eq=False)
-class Event:
-    """A bifurcation: its kind, the place itself, what is known of it, and the change of the route, if any."""
-
-    kind: str
-    place: Place
-    message: str
-    change: Change | None = None
-
-
-def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | Event | str]:
+def walk(
+    place: Place, low: float, high: float, most: int, monitors: Monitors
+) -> Iterator[Place | Event | str]:
     """Places along a branch with the events between them; the last item is why it ends."""
+    monitors.start(place)
     length, start, passed = FIRST_STEP, place, list[tuple[tuple[Route, ...], float]]()
     trace: list[tuple[float, float, float]] = []
     for _ in range(most):
@@ -88,13 +82,13 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
             yield "flip"
             return
         if not low <= last.value <= high:
-            yield from _to_the_edge(place, last, low, high)
+            yield from _to_the_edge(place, last, low, high, monitors)
             yield "range"
             return
         if change is not None:
             near = SAME_CHANGE * float(place.sizes[0])
             # Where a guard has no speed the parameter may stand still: that is no fold.
-            yield from (each for each in _between(place, last) if abs(each.place.value - last.value) > near)
+            yield from _between(place, last, monitors, near)
             beyond = change.onward.place
             met = (change.routes, last.value)
             again = any(routes == met[0] and abs(value - met[1]) < near for routes, value in passed)
@@ -106,21 +100,23 @@ def walk(place: Place, low: float, high: float, most: int) -> Iterator[Place | E
             if not low <= beyond.value <= high:
                 edge = at_value(beyond, low if beyond.value < low else high)
                 if edge is not None and is_real(edge.orbit):
+                    yield from monitors.between(last, edge)
                     yield edge
                 yield "range"
                 return
             passed.append(met)
+            yield from monitors.between(last, beyond)
             place, length = beyond, min(length, FIRST_STEP)
             yield place
             continue
         share = None if place is start else passes_by(start, place, after)
         closing = None if share is None else place.step(np.array([share * length]))
         if closing is not None:
-            yield from _between(place, closing[0])
+            yield from _between(place, closing[0], monitors)
             yield start
             yield "closed"
             return
-        yield from _between(place, after)
+        yield from _between(place, after, monitors)
         yield after
         if np.any(after.orbit.scale > UNBOUNDED * start.orbit.scale):
             yield "infinity"
@@ -172,15 +168,27 @@ def _is_crossed(place: Place) -> bool:
     return abs(branch_point(place)) < CROSSED
 
 
-def _to_the_edge(place: Place, after: Place, low: float, high: float) -> Iterator[Place | Event]:
+def _to_the_edge(
+    place: Place, after: Place, low: float, high: float, monitors: Monitors
+) -> Iterator[Place | Event]:
     edge = low if after.value < low else high
     last = at_value(zero_between(place, after, lambda each: each.value - edge) or place, edge)
     if last is not None:
-        yield from _between(place, last)
+        yield from _between(place, last, monitors)
         yield last
 
 
-def _between(place: Place, after: Place) -> Iterator[Event]:
+def _between(place: Place, after: Place, monitors: Monitors, near: float = -1.0) -> list[Event]:
+    """The smooth bifurcations between two places and the zeros of other functions, in order.
+
+    Smooth ones whose parameter is as ``near`` to that of the other place are left out.
+    """
+    smooth = [each for each in _smooth(place, after) if abs(each.place.value - after.value) > near]
+    found = [*smooth, *monitors.between(place, after)]
+    return sorted(found, key=lambda each: distance(place, each.place))
+
+
+def _smooth(place: Place, after: Place) -> Iterator[Event]:
     """The smooth bifurcations between two places."""
     changed = [kind for kind, function in TESTS.items() if changes(function(place), function(after))]
     if "branch point" in changed and "fold" in changed:

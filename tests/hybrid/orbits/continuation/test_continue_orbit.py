@@ -276,7 +276,7 @@ def test_a_picture(impacts):
     hybrid.plot.plot(impacts, ax=ax)
     assert ax.get_xlabel() == "w"
     labels = {text.get_text() for text in ax.get_legend().get_texts()}
-    assert labels == {"fold", "grazing"}
+    assert labels == {"stable", "unstable", "fold", "grazing"}
 
 
 class TestSwitching:
