@@ -90,6 +90,8 @@ def drawn(result: Any, **options: Any) -> Any:
 
 drawn.register(HybridArc, plot_arc)
 drawn.register(Branch, plot_branch)
+drawn.register(list, plot_branch)
+drawn.register(tuple, plot_branch)
 drawn.register(BifurcationCurve, plot_curve)
 drawn.register(HybridSystem, plot_graph)
 drawn.register(Jumps, plot_jumps)
@@ -108,7 +110,7 @@ def plot(result: Any, **options: Any) -> Any:
     :func:`plot_ends`, one of ``basins`` by :func:`plot_basins`, one of ``basin_fractions`` by
     :func:`plot_fractions` and one of ``sweep`` by :func:`plot_sweep`. A spectrum, a chart, a comparison of
     models and exponents from two orbits are drawn by ``lyapunov.plot``, and any other object by its method
-    ``plot``.
+    ``plot``. A list of branches is drawn into one picture.
 
     Parameters
     ----------

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybrid import arguments
+from hybrid.display.tables import with_unit
+from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Branch
 from hybrid.orbits.continuation.continue_bifurcation import BifurcationCurve
 from hybrid.orbits.labelled import table_at
@@ -19,7 +22,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-# Markers by kind of bifurcation. The sliding ones and others that have none here share one.
+# Markers by kind of bifurcation, and those of zeros of functions that callers name.
 MARKERS = {
     "fold": "o",
     "flip": "s",
@@ -33,30 +36,44 @@ MARKERS = {
     "switching-sliding": "h",
     "adding-sliding": "d",
 }
-OTHER = "X"
+OTHERS = ("X", "*", "H", "8", "P")
+LINES = {"stable": "-", "unstable": "--"}
+# Line width in points, the smallest area of a dot that is seen beside such a line, and the colour of what
+# stands for all branches.
+LINE = 1.4
+SEEN = 4.0
+NEUTRAL = "0.2"
+# Marks the first line of each branch, so that the next one has the next colour.
+OF_BRANCH = "branch"
 
 
 def plot_branch(
-    branch: Branch,
+    branch: Branch | Sequence[Branch],
     y: str | int = 0,
     *,
     over: xarray.Dataset | Axes | None = None,
+    label: str | Sequence[str] | None = None,
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Axes:
-    """Draw a component or an output at the orbits' points over the parameter, with the bifurcations.
+    """Draw what a branch is asked for by name over its parameter, with the bifurcations.
 
-    Stable parts are full, unstable ones dashed.
+    Stable parts are full, unstable ones dashed, and each kind of bifurcation has its marker; the legend says
+    so. Each further branch in the same axes has a colour of its own.
 
     Parameters
     ----------
     branch
-        From :func:`hybrid.continue_orbit`.
+        From :func:`hybrid.continue_orbit`, or several over one parameter.
     y
-        Name or index of the component, or name of the output; by default the first component.
+        Name or index of a component or name of an output at the orbits' points, or name of a function in
+        ``outputs=`` of :func:`hybrid.continue_orbit`; by default the first component.
     over
-        A chart over the same parameter with points of the section, from ``lyapunov.chart(section=...)``,
-        which is drawn below the branch; or the axes of a picture of one.
+        What is drawn as dots below the branch: a dataset that holds ``y`` over the same parameter, such as
+        one of :func:`hybrid.sweep`, or a chart with points of the section, from
+        ``lyapunov.chart(section=...)``; or the axes of a picture of one.
+    label
+        What the legend says of the branch, or of each.
     ax
         Axes to draw into; by default those of a new figure.
     figsize
@@ -69,45 +86,117 @@ def plot_branch(
     Raises
     ------
     ArgumentError
-        If a component does not exist, or the chart has no points over the parameter.
+        If a component does not exist, the dataset has no points over the parameter, or the branches are over
+        different parameters.
 
     Examples
     --------
     >>> import hybrid, models
+    >>> from hybrid.measures import maximum
     >>> from hybrid.plot import plot_branch
     >>> orbit = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
-    >>> ax = plot_branch(hybrid.continue_orbit(orbit, "w", (0.9, 1.1)), "x")
+    >>> branch = hybrid.continue_orbit(orbit, "w", (0.9, 1.1), outputs={"peak": maximum("v")})
+    >>> ax = plot_branch(branch, "peak")
     >>> ax.get_xlabel(), ax.get_ylabel()
-    ('w', 'x')
+    ('w', 'peak')
     """
-    arguments.instance("branch", branch, Branch, "Make one with hybrid.continue_orbit.")
-    system = branch.system
-    name = named_quantity("y", system, y)
+    branches = _branches_of(branch)
+    labels = _labels_of(label, branches)
+    names = [_quantity_of(each, y) for each in branches]
     cloud = None
     if over is not None:
         if hasattr(over, "data_vars"):
-            cloud = _points_of(over, branch.name, name)
+            cloud = _points_of(over, branches[0].name, names[0])
         elif ax is None and hasattr(over, "plot"):
             ax = over
         else:
-            wanted = "be a chart with points of its section, or axes in place of ax"
+            wanted = "be a sweep or a chart with points of its section, or axes in place of ax"
             raise arguments.refusal("over", wanted, over)
     (ax,) = axes_for(ax, 1, (6.4, 4.2), figsize)
     if cloud is not None:
-        ax.scatter(*cloud, s=dot_area(len(cloud[0])), color="0.6", linewidths=0, rasterized=True, zorder=0)
-    across, values = branch.parameter, branch[name]
-    for stable, part in groupby(range(len(branch)), key=lambda k: bool(branch.stable[k])):
+        _draw_points(ax, *cloud)
+    for each, name, text in zip(branches, names, labels, strict=True):
+        _draw_branch(ax, each, name, text)
+    known = Names(branches[0].system.state_names, branches[0].system.units)
+    ax.set_xlabel(known.label(branches[0].name))
+    unit = branches[0].output_units.get(names[0])
+    ax.set_ylabel(with_unit(names[0], unit) if names[0] in branches[0].outputs else known.label(names[0]))
+    _legend(ax)
+    return ax
+
+
+def _branches_of(given: object) -> list[Branch]:
+    """One branch or several, over one parameter."""
+    hint = "Make one with hybrid.continue_orbit."
+    if not isinstance(given, list | tuple):
+        return [arguments.instance("branch", given, Branch, hint)]
+    if not given:
+        raise arguments.refusal("branch", "be a branch, or several", given)
+    found = [arguments.instance(f"branch[{i}]", each, Branch, hint) for i, each in enumerate(given)]
+    over = list(dict.fromkeys(each.name for each in found))
+    if len(over) > 1:
+        raise ArgumentError(f"branch: all must be over one parameter to be drawn; got {', '.join(over)}.")
+    return found
+
+
+def _labels_of(given: object, branches: Sequence[Branch]) -> list[str | None]:
+    """What the legend says of each branch."""
+    if given is None:
+        return [None] * len(branches)
+    found = [given] if isinstance(given, str) else arguments.items("label", given, "be a text per branch")
+    if len(found) != len(branches) or not all(isinstance(each, str) for each in found):
+        raise arguments.refusal("label", f"be a text per branch, of which there are {len(branches)}", given)
+    return found
+
+
+def _quantity_of(branch: Branch, y: object) -> str:
+    """The name of what a branch is asked for."""
+    if arguments.whole_number(y) is None:
+        return branch.quantity("y: ", y)
+    return named_quantity("y", branch.system, y)
+
+
+def _draw_branch(ax: Axes, branch: Branch, name: str, label: str | None) -> None:
+    """Lines of a branch in the next colour, its bifurcations, and what a legend needs."""
+    colour = COLOURS[sum(each.get_gid() == OF_BRANCH for each in ax.lines) % len(COLOURS)]
+    if label is not None:
+        ax.plot([], [], "-", color=colour, lw=LINE, label=label)
+    across, values, stable = _with_bifurcations(branch, name)
+    first = True
+    for is_stable, part in groupby(range(len(stable)), key=lambda k: bool(stable[k])):
         inside = list(part)
         # The line reaches to the next part.
-        shown = [*inside, *([inside[-1] + 1] if inside[-1] + 1 < len(branch) else [])]
-        ax.plot(across[shown], values[shown], "-" if stable else "--", color=COLOURS[0], lw=1.4)
+        shown = [*inside, *([inside[-1] + 1] if inside[-1] + 1 < len(stable) else [])]
+        text, style = [*LINES.items()][0 if is_stable else 1]
+        (line,) = ax.plot(across[shown], values[shown], style, color=colour, lw=LINE)
+        line.set_gid(OF_BRANCH if first else None)
+        first = False
+        if text not in _texts(ax):
+            ax.plot([], [], style, color=NEUTRAL, lw=LINE, label=text)
     found = branch.bifurcations
-    there = table_at(system, [name], [each.orbit for each in found])[:, 0]
+    there = _there(branch, name)
     _mark(ax, [(each.kind, each.value, up) for each, up in zip(found, there, strict=True)])
-    names = Names(system.state_names, system.units)
-    ax.set_xlabel(names.label(branch.name))
-    ax.set_ylabel(names.label(name))
-    return ax
+
+
+def _there(branch: Branch, name: str) -> np.ndarray:
+    """What a branch is asked for, at its bifurcations."""
+    found = branch.bifurcations
+    if name in branch.outputs:
+        return np.array([each.outputs[name] for each in found])
+    return table_at(branch.system, [name], [each.orbit for each in found])[:, 0]
+
+
+def _with_bifurcations(branch: Branch, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Parameter, values and stability along a branch, with the bifurcations among its orbits."""
+    there = _there(branch, name)
+    shown = [(each, up) for each, up in zip(branch.bifurcations, there, strict=True) if np.isfinite(up)]
+    at = [each.position for each, _ in shown]
+    stable = [each.stable[1] if each.stable[1] is not None else bool(each.stable[0]) for each, _ in shown]
+    return (
+        np.insert(branch.parameter, at, [each.value for each, _ in shown]),
+        np.insert(branch[name], at, [up for _, up in shown]),
+        np.insert(branch.stable, at, stable),
+    )
 
 
 def plot_curve(
@@ -154,19 +243,55 @@ def plot_curve(
 
 
 def _mark(ax: Axes, found: list[tuple[str, float, float]]) -> None:
-    """Signs for what has a kind and a place, with a legend."""
+    """Signs for what has a kind and a place, named once for a legend."""
     for kind in dict.fromkeys(each[0] for each in found):
         at = np.array([each[1:] for each in found if each[0] == kind])
-        marker = MARKERS.get(kind, OTHER)
-        ax.plot(at[:, 0], at[:, 1], marker, color=COLOURS[1], ms=6, label=kind, zorder=3)
-    if found:
-        small_legend(ax)
+        marker = MARKERS.get(kind) or _other_marker(ax, kind)
+        label = None if kind in _texts(ax) else kind
+        ax.plot(*at.T, marker, color=NEUTRAL, mfc="white", ms=5.5, mew=1.1, label=label, zorder=3)
 
 
-def _points_of(chart: Any, name: str, component: str) -> tuple[np.ndarray, np.ndarray]:
-    """Parameter and component ``(N,)`` of the points of a chart's section."""
-    points = chart.get("section")
+def _other_marker(ax: Axes, kind: str) -> str:
+    """The marker that a kind has in the axes, or one that no other kind has there."""
+    handles, texts = ax.get_legend_handles_labels()
+    if kind in texts:
+        return str(handles[texts.index(kind)].get_marker())
+    taken = [each.get_marker() for each in ax.lines]
+    return next((each for each in OTHERS if each not in taken), OTHERS[0])
+
+
+def _legend(ax: Axes) -> None:
+    """What the branches are, then what kinds of lines mean, then the markers."""
+    handles, texts = ax.get_legend_handles_labels()
+
+    def rank(i: int) -> int:
+        if texts[i] in LINES:
+            return 1
+        return 2 if handles[i] in ax.lines and handles[i].get_linestyle() == "None" else 0
+
+    small_legend(ax, [handles[i] for i in sorted(range(len(handles)), key=rank)])
+
+
+def _texts(ax: Axes) -> list[str]:
+    """What a legend of the axes would say."""
+    return ax.get_legend_handles_labels()[1]
+
+
+def _draw_points(ax: Axes, kind: str, across: np.ndarray, up: np.ndarray) -> None:
+    """Dots below the branches, wide enough to be seen beside a line through them."""
+    area = max(dot_area(len(across)), SEEN)
+    ax.scatter(across, up, s=area, color="0.65", linewidths=0, rasterized=True, zorder=0, label=kind)
+
+
+def _points_of(dataset: Any, name: str, asked: str) -> tuple[str, np.ndarray, np.ndarray]:
+    """What a legend says of a dataset's points, and their parameter and values ``(N,)``."""
+    if asked in dataset.data_vars and name in dataset[asked].dims:
+        values = dataset[asked].transpose(name, ...).values.reshape(dataset.sizes[name], -1)
+        at = np.repeat(np.asarray(dataset[name], dtype=float), values.shape[1])
+        return "sweep", at, values.ravel()
+    points = dataset.get("section")
     if points is None or name not in points.dims or points.sizes.get("sample", 0) == 0:
-        raise arguments.refusal("over", f"be a chart over {name!r} alone, computed with section=100", chart)
-    values = column("y", chart.transpose(name, "sample", ...), component, SECTION)[1]
-    return np.repeat(np.asarray(points[name], dtype=float), values.shape[1]), values.ravel()
+        wanted = f"be a chart over {name!r} alone, computed with section=100, or hold {asked!r} over {name!r}"
+        raise arguments.refusal("over", wanted, dataset)
+    values = column("y", dataset.transpose(name, "sample", ...), asked, SECTION)[1]
+    return "section", np.repeat(np.asarray(points[name], dtype=float), values.shape[1]), values.ravel()

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 # One colour per mode: the palette of Okabe and Ito, distinguishable with any colour vision, faint hues last.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
+# Entries of a legend in one row.
+MOST_COLUMNS = 5
+
 # Diameter in points of a dot that fills a page.
 LARGEST_DOT = 1000.0
 
@@ -159,13 +162,13 @@ def dot_area(count: int, size: float | None = None) -> float:
 
 
 def small_legend(ax: Axes, handles: list[Any] | None = None) -> None:
-    """A legend above the axes, in one row, of the given handles or of what the axes hold."""
+    """A legend above the axes, in rows of five, of the given handles or of what the axes hold."""
     found = ax.get_legend_handles_labels()[0] if handles is None else handles
     ax.legend(
         handles=found,
         loc="lower right",
         bbox_to_anchor=(1, 1),
-        ncols=len(found),
+        ncols=min(len(found), MOST_COLUMNS),
         frameon=False,
         borderaxespad=0.2,
         fontsize=8,
