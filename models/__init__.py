@@ -12,6 +12,7 @@ from models.coulomb_stick_slip import coulomb_stick_slip
 from models.digital_pwm import digital_pwm
 from models.dosing_schedule import dosing_schedule
 from models.dry_friction_oscillator import dry_friction_oscillator
+from models.gear_pair import gear_pair
 from models.impact_oscillator import impact_oscillator
 from models.impact_pair import impact_pair
 from models.infusion_schedule import infusion_schedule
@@ -41,6 +42,7 @@ __all__ = [
     "digital_pwm",
     "dosing_schedule",
     "dry_friction_oscillator",
+    "gear_pair",
     "impact_oscillator",
     "impact_pair",
     "infusion_schedule",

@@ -280,7 +280,7 @@ def _texts(ax: Axes) -> list[str]:
 def _draw_points(ax: Axes, kind: str, across: np.ndarray, up: np.ndarray) -> None:
     """Dots below the branches, wide enough to be seen beside a line through them."""
     area = max(dot_area(len(across)), SEEN)
-    ax.scatter(across, up, s=area, color="0.65", linewidths=0, rasterized=True, zorder=0, label=kind)
+    ax.scatter(across, up, s=area, color="0.55", linewidths=0, rasterized=True, zorder=0, label=kind)
 
 
 def _points_of(dataset: Any, name: str, asked: str) -> tuple[str, np.ndarray, np.ndarray]:

@@ -82,6 +82,14 @@ RUNS = {
         models.infusion_schedule(),
         {"states": {"c": (0.0, 5.0), "r": (0.0, 10.0)}, "t_span": (0.0, 30.0)},
     ),
+    "gear_pair": (
+        models.gear_pair(),
+        {
+            "states": {"x": (-1.5, 1.5), "v": (-0.6, 0.6)},
+            "parameters": {"kappa": (0.0, 0.3), "e": (0.0, 0.2)},
+            "t_span": (0.0, 12.0),
+        },
+    ),
     "impact_oscillator": (models.impact_oscillator(), {"states": {"x": (-1.0, 0.7)}, "t_span": (0.0, 7.0)}),
     "impact_pair": (models.impact_pair(), {"states": {"x": (-1.5, 1.5)}, "t_span": (0.0, 8.0)}),
     "refractory_neuron": (
