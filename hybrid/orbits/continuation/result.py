@@ -12,6 +12,8 @@ from hybrid.orbits.continuation.passing import CLOSED, Pass
 from hybrid.orbits.continuation.place import moment, share_of
 from hybrid.orbits.continuation.route import Route
 from hybrid.orbits.orbit import PeriodicOrbit, first_start, turns_over, unaged
+from hybrid.simulation.arc import HybridArc
+from hybrid.solvers import Solver
 from hybrid.status import SUCCESS
 
 
@@ -44,6 +46,12 @@ def orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
     return found
 
 
+def arc_of(orbit: Pass, points: Points, solver: Solver) -> HybridArc:
+    """The arc of the orbit over one period, from the point that stands for it."""
+    [found] = unaged([_start_from(orbit, *points.at(orbit), points.t0, has_matrix=False)])
+    return found.arc(solver)
+
+
 def whole_orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
     """The orbit from the point that stands for it, with the age if the family has one.
 
@@ -58,9 +66,9 @@ def whole_orbit_of(orbit: Pass, points: Points) -> PeriodicOrbit:
     return attrs.evolve(found, status=order_status(orbit) or SUCCESS)
 
 
-def _start_from(orbit: Pass, i: int, share: float, t0: float) -> PeriodicOrbit:
+def _start_from(orbit: Pass, i: int, share: float, t0: float, *, has_matrix: bool = True) -> PeriodicOrbit:
     """The orbit from a share of a stretch; if it jumps there, from after or before these jumps or later."""
-    found, stays = _orbit_from(orbit, i, share, t0), np.diff(orbit.loop.times)
+    found, stays = _orbit_from(orbit, i, share, t0, has_matrix), np.diff(orbit.loop.times)
     if share > 0.0 or orbit.landings[i - 1] is None or not orbit.family.forced:
         return found
 
@@ -70,14 +78,17 @@ def _start_from(orbit: Pass, i: int, share: float, t0: float) -> PeriodicOrbit:
         while stays[k] <= CLOSED * orbit.loop.period:
             k = (k - 1) % len(stays)
             names = (*orbit.family.route[k].fired, *names)
-        yield _orbit_from(orbit, k, 1.0, t0), names
-        yield _orbit_from(orbit, i, found.moment / float(stays[i]), t0 + found.moment), []
+        yield _orbit_from(orbit, k, 1.0, t0, has_matrix), names
+        yield _orbit_from(orbit, i, found.moment / float(stays[i]), t0 + found.moment, has_matrix), []
 
     return first_start(points())
 
 
-def _orbit_from(orbit: Pass, i: int, share: float, t0: float) -> PeriodicOrbit:
-    """The orbit from a share of a stretch, or from a time if the system is forced."""
+def _orbit_from(orbit: Pass, i: int, share: float, t0: float, has_matrix: bool) -> PeriodicOrbit:
+    """The orbit from a share of a stretch, or from a time if the system is forced.
+
+    Its fundamental matrix is nan unless it is to have one.
+    """
     family, loop = orbit.family, orbit.loop
     (t, x), mode = moment(orbit, i, share), mode_at(orbit, i, share)
     multipliers = orbit.multipliers
@@ -96,7 +107,7 @@ def _orbit_from(orbit: Pass, i: int, share: float, t0: float) -> PeriodicOrbit:
         period=orbit.period,
         multipliers=multipliers,
         log_moduli=moduli,
-        fundamental=fundamental_at(orbit, i, share),
+        fundamental=fundamental_at(orbit, i, share) if has_matrix else np.full((family.n,) * 2, np.nan),
         residual=float(np.abs(residuals).max()),
         iterations=0,
         signature=(

@@ -15,7 +15,7 @@ from hybrid.measures.measure import Measure
 from hybrid.orbits.continuation.event import KINDS
 from hybrid.orbits.continuation.labelled import THERE
 from hybrid.orbits.continuation.passing import Pass
-from hybrid.orbits.continuation.result import Points, orbit_of
+from hybrid.orbits.continuation.result import Points, arc_of, orbit_of
 from hybrid.orbits.orbit import PeriodicOrbit, closes
 from hybrid.simulation.arc import HybridArc
 from hybrid.solvers import Solver
@@ -110,7 +110,7 @@ class Watch:
             raise Unmeasured(f"stop raised {_told(error)} at {_where(orbit)}.") from error
 
     def _values(self, argument: str, functions: Mapping[str, OfArc], orbit: Pass) -> dict[str, float]:
-        arc = orbit_of(orbit, self.points).arc(self.solver)
+        arc = arc_of(orbit, self.points, self.solver)
         where = _where(orbit)
         if not closes(arc.status):
             raise Unmeasured(f"{argument}: the orbit at {where} cannot be run around: {arc.status.message}")

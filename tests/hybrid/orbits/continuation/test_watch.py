@@ -272,6 +272,7 @@ class TestFailures:
 
 
 def test_nothing_is_run_that_is_not_asked_for(free, monkeypatch):
+    monkeypatch.setattr(watch, "arc_of", None)
     monkeypatch.setattr(watch, "orbit_of", None)
     assert continue_orbit(free, "w", (1.4, 1.7)).status.ok
 
