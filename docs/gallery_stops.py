@@ -8,8 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 import models
-from hybrid import DOP853, simulate, stroboscopic_section
-from hybrid.plot import COLOURS, plot_phase
+from hybrid import DOP853, continue_orbit, periodic_orbit, simulate, stroboscopic_section
+from hybrid.measures import amplitude
+from hybrid.plot import COLOURS, plot_branch, plot_phase
 
 COARSE = DOP853(rtol=1e-7, atol=1e-9)
 DOTS = {"marker": ".", "markersize": 1.5, "mew": 0, "linestyle": "None", "color": COLOURS[0]}
@@ -92,6 +93,28 @@ def stop_oscillator(ax: Axes) -> None:
     ax.legend(frameon=False)
 
 
+def gear_pair(ax: Axes) -> None:
+    system = models.gear_pair()
+    orbit = periodic_orbit(system, (1.1, 0.0), parameters={"w": 1.4})
+    branch = continue_orbit(orbit, "w", (0.5, 1.4), outputs={"amplitude": amplitude("x")})
+    frequencies = np.linspace(0.5, 1.4, 46)
+    for order, marker, label in ((1, "^", "up"), (-1, "v", "down")):
+        x, mode, found = (1.1, 0.0), "drive", []
+        for w in frequencies[::order]:
+            period = system.forcing_period({"w": w})
+            settled = simulate(
+                system, x, (0.0, 100 * period), mode=mode, parameters={"w": w}, samples=[100 * period]
+            )
+            x, mode = settled.x[-1], str(settled.mode[-1])
+            found.append(amplitude("x")(simulate(system, x, (0.0, period), mode=mode, parameters={"w": w})))
+        ax.plot(frequencies[::order], found, marker, color="0.55", markersize=3.5, label=label)
+    plot_branch(branch, "amplitude", ax=ax)
+    ax.get_legend().remove()
+    ax.legend(frameon=False, fontsize=7)
+    ax.set_xlabel("mesh frequency $w$")
+    ax.set_ylabel("amplitude of $x$")
+
+
 def rocking_block(ax: Axes) -> None:
     system = models.rocking_block()
     plot_phase(simulate(system, (0.22, 0.0), (0.0, 9.0)), "theta", "omega", ax=ax)
@@ -124,6 +147,11 @@ PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
         "stop_oscillator",
         "Response of the oscillator between stops, with and without preload: the resonance bends and jumps.",
         stop_oscillator,
+    ),
+    (
+        "gear_pair",
+        "Resonance of gears with backlash: orbits, and runs up and down in the frequency.",
+        gear_pair,
     ),
     (
         "rocking_block",

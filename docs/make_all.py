@@ -19,6 +19,7 @@ COMMANDS = {
     "theory": [str(HERE / "make_theory.py")],
     "explore": [str(HERE / "make_explore.py")],
     "gallery": [str(HERE / "make_gallery.py")],
+    "resonance": [str(HERE / "make_resonance.py")],
     "architecture": [str(HERE / "make_architecture.py")],
     "founding_chart": [str(HERE / "make_founding_chart.py")],
     "order": ["-m", "benchmarks.order"],

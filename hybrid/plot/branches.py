@@ -41,7 +41,7 @@ LINES = {"stable": "-", "unstable": "--"}
 # Line width in points, the smallest area of a dot that is seen beside such a line, and the colour of what
 # stands for all branches.
 LINE = 1.4
-SEEN = 4.0
+SEEN = 2.6
 NEUTRAL = "0.2"
 # Marks the first line of each branch, so that the next one has the next colour.
 OF_BRANCH = "branch"
