@@ -10,7 +10,7 @@ from hybrid import arguments
 from hybrid.measures.profile import Profile, profile_of
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.quantities import quantity
-from hybrid.system.graph import HybridSystem
+from hybrid.system.graph import HybridSystem, as_system
 
 FORMULAS: dict[str, Callable[[Profile], float]] = {
     "maximum": Profile.maximum,
@@ -69,8 +69,14 @@ class Measure:
         return float(FORMULAS[self.kind](profile_of(arc, quantity("name: ", self.name, arc.system))))
 
     def unit(self, system: HybridSystem) -> str | None:
-        """The unit of the number, if the system gives one for the name."""
-        return system.units.get(self.name)
+        """The unit of the number, if the system gives one for the name.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no system.
+        """
+        return as_system("system", system).units.get(self.name)
 
     def __repr__(self) -> str:
         return f"{self.kind}({self.name!r})"

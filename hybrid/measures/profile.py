@@ -11,7 +11,7 @@ from numpy.polynomial import chebyshev
 from hybrid.errors import ArgumentError
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.points import Pieces
-from hybrid.simulation.quantities import Quantity
+from hybrid.simulation.quantities import Evaluator
 
 DEGREE = 16
 # A part is resolved if the last coefficients of its polynomial are this small beside the largest value.
@@ -71,7 +71,7 @@ class Profile:
     """
 
     arc: HybridArc
-    quantity: Quantity
+    quantity: Evaluator
     parts: Parts
 
     def maximum(self) -> float:
@@ -135,7 +135,7 @@ def profile_of(arc: HybridArc, name: str) -> Profile:
         If the arc has no dense output or takes no time, or if the quantity has no value or one that is not
         finite.
     """
-    pieces, quantity = _pieces_of(arc), Quantity(arc.system, name)
+    pieces, quantity = _pieces_of(arc), Evaluator(arc.system, name)
     has_value = np.array([quantity.has_value_in(mode) for mode in range(len(arc.system.modes))])
     [left] = np.nonzero(has_value[pieces.mode] & (pieces.h > 0.0))
     if not left.size:
@@ -171,7 +171,7 @@ def _pieces_of(arc: HybridArc) -> Pieces:
     return pieces
 
 
-def _values_at(arc: HybridArc, quantity: Quantity, step: np.ndarray, places: np.ndarray) -> np.ndarray:
+def _values_at(arc: HybridArc, quantity: Evaluator, step: np.ndarray, places: np.ndarray) -> np.ndarray:
     """The quantity ``(M, K)`` at places ``(M, K)`` in steps ``(M,)``."""
     pieces = _pieces_of(arc)
     own = pieces.coefficients[step]

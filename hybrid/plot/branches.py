@@ -152,7 +152,7 @@ def _labels_of(given: object, branches: Sequence[Branch]) -> list[str | None]:
 def _quantity_of(branch: Branch, y: object) -> str:
     """The name of what a branch is asked for."""
     if arguments.whole_number(y) is None:
-        return branch.quantity("y: ", y)
+        return branch._asked("y: ", y)
     return named_quantity("y", branch.system, y)
 
 
@@ -255,7 +255,8 @@ def _other_marker(ax: Axes, kind: str) -> str:
     """The marker that a kind has in the axes, or one that no other kind has there."""
     handles, texts = ax.get_legend_handles_labels()
     if kind in texts:
-        return str(handles[texts.index(kind)].get_marker())
+        known: Any = handles[texts.index(kind)]
+        return str(known.get_marker())
     taken = [each.get_marker() for each in ax.lines]
     return next((each for each in OTHERS if each not in taken), OTHERS[0])
 
@@ -267,7 +268,8 @@ def _legend(ax: Axes) -> None:
     def rank(i: int) -> int:
         if texts[i] in LINES:
             return 1
-        return 2 if handles[i] in ax.lines and handles[i].get_linestyle() == "None" else 0
+        handle: Any = handles[i]
+        return 2 if handle in ax.lines and handle.get_linestyle() == "None" else 0
 
     small_legend(ax, [handles[i] for i in sorted(range(len(handles)), key=rank)])
 

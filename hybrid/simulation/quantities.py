@@ -83,11 +83,11 @@ def values_of(
     parameters
         Their values, ``(m,)``, or ``(N, m)`` if they differ from point to point.
     """
-    return Quantity(system, name)(t, x, mode, parameters)
+    return Evaluator(system, name)(t, x, mode, parameters)
 
 
 @attrs.frozen(eq=False)
-class Quantity:
+class Evaluator:
     """A component or an output that is asked for at points again and again: its functions are traced once."""
 
     system: HybridSystem

@@ -13,6 +13,7 @@ import pytest
 import xarray as xr
 
 import hybrid
+import hybrid.measures
 import hybrid.plot
 import hybrid.testing
 import lyapunov
@@ -121,7 +122,7 @@ ALSO_CALLED = {"overrides": "parameters", "name": "mode", "flip": "elastic"}
 def public_functions():
     """Every public function, class and method that takes arguments."""
     found = []
-    for module in (hybrid, hybrid.testing, lyapunov):
+    for module in (hybrid, hybrid.measures, hybrid.testing, lyapunov):
         found += [getattr(module, name) for name in module.__all__]
     plots = [each for name, each in vars(lyapunov.plot).items() if name.startswith("plot_")]
     assert len(plots) == 10

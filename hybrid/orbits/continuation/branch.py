@@ -11,7 +11,6 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.display.tables import counted
-from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.change import Change
 from hybrid.orbits.continuation.event import KINDS
 from hybrid.orbits.continuation.labelled import dataset_of
@@ -153,9 +152,9 @@ class Branch(Asked):
         ArgumentError
             If there is none of that name.
         """
-        return self._table([self.quantity("", name)])[:, 0]
+        return self._table([self._asked("", name)])[:, 0]
 
-    def quantity(self, title: str, name: object) -> str:
+    def _asked(self, title: str, name: object) -> str:
         """The name of what the branch can be asked for, or an ArgumentError that begins with ``title``."""
         if isinstance(name, str) and name in self.outputs:
             return name
@@ -164,26 +163,26 @@ class Branch(Asked):
         allowed = [*self.system.quantity_names, *self.outputs]
         return arguments.known(f"{title}Component or output", name, allowed, "Components and outputs")
 
-    def of(self, *kinds: str) -> tuple[Bifurcation, ...]:
+    def of(self, kinds: str | Iterable[str]) -> tuple[Bifurcation, ...]:
         """The bifurcations of one kind or of several, in order along the branch.
 
         Parameters
         ----------
-        *kinds
-            Such as ``"flip"``, or names of functions in ``events=``.
+        kinds
+            Such as ``"flip"`` or ``("fold", "flip")``, or names of functions in ``events=``.
 
         Raises
         ------
         ArgumentError
             If there is no such kind.
         """
-        if not kinds:
-            raise ArgumentError(f"kinds must name one kind or several; allowed are {', '.join(KINDS)}.")
+        wanted = "be a kind of bifurcation, or several of them"
+        names = [kinds] if isinstance(kinds, str) else arguments.items("kinds", kinds, wanted, least=1)
         there = ", ".join(dict.fromkeys(each.kind for each in self.bifurcations)) or "none"
         allowed = (*KINDS, *self.events)
-        for kind in kinds:
-            arguments.known("kinds: Kind", kind, allowed, f"On this branch: {there}. Kinds")
-        return tuple(each for each in self.bifurcations if each.kind in kinds)
+        for name in names:
+            arguments.known("kinds: Kind", name, allowed, f"On this branch: {there}. Kinds")
+        return tuple(each for each in self.bifurcations if each.kind in names)
 
     @cached_property
     def orbits(self) -> tuple[PeriodicOrbit, ...]:

@@ -4,7 +4,7 @@ import math
 
 import hybrid
 import lyapunov
-from hybrid import HybridSystem
+from hybrid import HybridSystem, measures
 from models import contact
 from tests.hybrid.arguments.plots import FIGSIZE
 from tests.hybrid.arguments.values import (
@@ -19,8 +19,15 @@ from tests.hybrid.arguments.values import (
     PARAMETERS,
     POSITIVE,
     SOLVER,
+    SYSTEM,
+    Hostile,
+    Odd,
     call,
 )
+
+# Functions of an arc by name that are none, and a name that is no text.
+OF_ARC = ["a", 3, [abs], {"y": 3}, {"y": None}, {3: abs}, {"": abs}, Odd()]
+NAMED = [each for each in NAME if not isinstance(each, str)]
 
 
 def methods(made):
@@ -46,6 +53,14 @@ def methods(made):
             {"names": [None, 3, "w", ["nope"], [3], [None], []], "solver": SOLVER},
         ),
         (call(hybrid.Branch.orbit, made["branch"], 0), {"i": [None, "a", 1.5, 10**9, True]}),
+        (call(hybrid.Branch.of, made["branch"], "fold"), {"kinds": [None, *NAME, (), ["fold", 3], ["flop"]]}),
+        (call(measures.Measure, "mean", "q"), {"kind": [None, *NAME], "name": NAMED}),
+        (call(measures.Measure.__call__, measures.mean("q"), arc), {"arc": [None, "a", 3, made["orbit"]]}),
+        (call(measures.Measure.unit, measures.mean("q"), BALL), {"system": SYSTEM}),
+        *(
+            (call(getattr(measures, name), "q"), {"name": NAMED})
+            for name in ("maximum", "minimum", "amplitude", "mean", "rms")
+        ),
         (call(hybrid.BifurcationCurve.orbit, made["curve"], 0), {"i": [None, "a", 1.5, 10**9, True]}),
         (
             call(hybrid.switch_branch, made["flip"]),
@@ -57,6 +72,9 @@ def methods(made):
                 "orbit": [None, "a", 3, BALL],
                 "parameter": [None, *NAME],
                 "span": [None, 3, (2.0, 3.0), (1.1, 0.9), (0.9,), "ab"],
+                "outputs": OF_ARC,
+                "events": OF_ARC,
+                "stop": [3, True, "flop", (), [3], ["fold", None], Odd(), Hostile()],
                 "solver": SOLVER,
                 "max_steps": [0, *COUNT],
                 "progress": [3, "a"],
@@ -67,6 +85,7 @@ def methods(made):
             {
                 "bifurcation": [None, "a", 3, made["orbit"]],
                 "over": [None, 3, "ab", {"E": (24, 25)}, {"E": (24, 25), "q": (0, 1)}, {"E": 1, "V_ref": 2}],
+                "outputs": OF_ARC,
                 "solver": SOLVER,
                 "max_steps": [0, *COUNT],
                 "progress": [3, "a"],

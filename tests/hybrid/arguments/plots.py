@@ -66,7 +66,14 @@ def plots(made):
         ),
         (
             call(hybrid.plot.plot_branch, made["branch"]),
-            {"branch": [None, "a", 3, arc], "y": COMPONENT, "over": AXES[1:], "ax": AXES, "figsize": FIGSIZE},
+            {
+                "branch": [None, "a", 3, arc],
+                "y": COMPONENT,
+                "over": AXES[1:],
+                "label": [3, True, [3], ["a", "b"], {}],
+                "ax": AXES,
+                "figsize": FIGSIZE,
+            },
         ),
         (
             call(hybrid.plot.plot_curve, made["curve"]),
