@@ -78,6 +78,7 @@ def walk(
         if _comes_to_its_half(place, last):
             half = _halved(place, last)
             if half is not None and low <= half.value <= high:
+                yield from monitors.between(place, half)
                 yield Event("flip", half, "the orbit has half the period: this branch begins here")
             yield "flip"
             return
