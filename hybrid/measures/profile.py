@@ -98,7 +98,7 @@ class Profile:
 
     def _average(self, values: np.ndarray) -> float:
         parts, pieces = self.parts, _pieces_of(self.arc)
-        left_out = np.setdiff1d(np.unique(pieces.mode), np.unique(pieces.mode[parts.step]))
+        left_out = np.setdiff1d(pieces.mode[pieces.h > 0.0], pieces.mode[parts.step])
         if left_out.size:
             modes = ", ".join(repr(self.arc.system.mode_names[i]) for i in left_out)
             raise ArgumentError(
@@ -106,13 +106,15 @@ class Profile:
                 "so it has no mean and no RMS value. Give the output a value there, such as 0.0."
             )
         rates = _slopes_at(pieces.coefficients[parts.step, :, -1], parts.places)
-        total = float(np.sum(0.5 * parts.width * ((values * rates) @ WEIGHTS)))
-        return total / float(self.arc.t[-1] - self.arc.t[0])
+        total, time = (float(parts.width @ (each @ WEIGHTS)) for each in (values * rates, rates))
+        return total / time
 
     def _largest(self, sign: float) -> float:
         """The largest value of the quantity times a sign."""
-        parts, values = self.parts, sign * self.parts.values
-        best = float(np.nanmax([values.max(), *(sign * self.arc[self.quantity.name])]))
+        arc, parts, values = self.arc, self.parts, sign * self.parts.values
+        # States between jumps at one instant are on no step.
+        points = self.quantity(arc.t, arc.x, arc._mode_index, arc._values)
+        best = float(np.fmax.reduce(sign * points, initial=values.max()))
         coefficients = values @ TO_COEFFICIENTS.T
         bounds = coefficients[:, 0] + np.abs(coefficients[:, 1:]).sum(axis=1)
         for i in np.argsort(-bounds):
@@ -121,7 +123,7 @@ class Profile:
             places = np.array([*_turns(coefficients[i])])
             if places.size:
                 there = parts.low[i] + 0.5 * parts.width[i] * (1.0 + places)
-                found = _values_at(self.arc, self.quantity, parts.step[[i]], there[None])
+                found = _values_at(arc, self.quantity, parts.step[[i]], there[None])
                 best = max(best, float((sign * found).max()))
         return best
 

@@ -59,7 +59,7 @@ ENDS = {
     "family": "orbits that all have one value of the parameter",
     "most": "the limit of steps",
     "lost": "an orbit beyond which Newton's method finds none",
-    "stop": "an orbit at which stop= is true",
+    "stop": "an orbit for which stop= is true",
     "unmeasured": "an orbit that a function fails on",
 }
 # A walk that ends where stop= names a kind says so with this before it.
@@ -439,5 +439,5 @@ def _told(why: str) -> str:
     """Why a walk ends, in words."""
     if why.startswith(STOPPED):
         kind = why.removeprefix(STOPPED)
-        return f"{_a(kind) if kind in KINDS else f'a zero of events[{kind!r}]'}, which stop= names"
+        return f"{_a(kind) if kind in KINDS else f'a zero of events[{kind!r}]'} (named in stop=)"
     return ENDS.get(why, _a(why))

@@ -160,7 +160,7 @@ class TestStop:
         assert branch.bifurcations[0].position == len(branch)
         assert branch.bifurcations[0].stable[1] is None
         assert branch.status.ok
-        told = "The branch ends at the end of the range and at a fold, which stop= names."
+        told = "The branch ends at the end of the range and at a fold (named in stop=)."
         assert branch.status.message == told
 
     def test_at_one_of_several_kinds(self, impacts):
@@ -171,13 +171,13 @@ class TestStop:
         near = {"near": lambda arc: maximum("x")(arc) - 0.15}
         branch = continue_orbit(free, "w", (1.2, 2.5), events=near, stop="near")
         assert branch.parameter.max() < branch.of("near")[0].value < 2.0
-        assert "a zero of events['near'], which stop= names" in branch.status.message
+        assert "a zero of events['near'] (named in stop=)" in branch.status.message
 
     def test_where_a_function_of_an_orbit_is_true(self, free):
         branch = continue_orbit(free, "w", (1.2, 2.5), stop=lambda orbit: orbit.parameters["w"] > 1.8)
         assert np.sum(branch.parameter > 1.8) == 1
         assert branch.parameter.min() == 1.2
-        assert "an orbit at which stop= is true" in branch.status.message
+        assert "an orbit for which stop= is true" in branch.status.message
 
     def test_it_fails(self, free):
         branch = continue_orbit(free, "w", (1.2, 2.5), stop=lambda orbit: 1 / 0)
