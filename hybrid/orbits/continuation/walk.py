@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 import numpy as np
 
-from hybrid.orbits.continuation.change import located
+from hybrid.orbits.continuation.change import Change, located
 from hybrid.orbits.continuation.event import Event
 from hybrid.orbits.continuation.instants import SAME, halves, passes_by
 from hybrid.orbits.continuation.monitors import Monitors
@@ -76,10 +76,7 @@ def walk(
             yield "equilibrium"
             return
         if _comes_to_its_half(place, last):
-            half = _halved(place, last)
-            if half is not None and low <= half.value <= high:
-                yield from monitors.between(place, half)
-                yield Event("flip", half, "the orbit has half the period: this branch begins here")
+            yield from _to_its_half(place, last, low, high, monitors)
             yield "flip"
             return
         if not low <= last.value <= high:
@@ -87,27 +84,11 @@ def walk(
             yield "range"
             return
         if change is not None:
-            near = SAME_CHANGE * float(place.sizes[0])
-            # Where a guard has no speed the parameter may stand still: that is no fold.
-            yield from _between(place, last, monitors, near)
-            beyond = change.onward.place
-            met = (change.routes, last.value)
-            again = any(routes == met[0] and abs(value - met[1]) < near for routes, value in passed)
-            if not again and change.alters:
-                yield Event(change.kind, last, change.told, change)
-            if beyond is None or again:
-                yield change.kind
+            onward = yield from _past(change, place, (low, high), monitors, passed)
+            if isinstance(onward, str):
+                yield onward
                 return
-            if not low <= beyond.value <= high:
-                edge = at_value(beyond, low if beyond.value < low else high)
-                if edge is not None and is_real(edge.orbit):
-                    yield from monitors.between(last, edge)
-                    yield edge
-                yield "range"
-                return
-            passed.append(met)
-            yield from monitors.between(last, beyond)
-            place, length = beyond, min(length, FIRST_STEP)
+            place, length = onward, min(length, FIRST_STEP)
             yield place
             continue
         share = None if place is start else passes_by(start, place, after)
@@ -131,6 +112,38 @@ def walk(
             length = min(LONGEST_STEP, LONGER * length)
         place = refined(after)
     yield "most"
+
+
+def _past(
+    change: Change,
+    place: Place,
+    span: tuple[float, float],
+    monitors: Monitors,
+    passed: list[tuple[tuple[Route, ...], float]],
+) -> Generator[Place | Event, None, Place | str]:
+    """What is met from a place to a change of the route; returns the orbit beyond, or why the walk ends.
+
+    The changes that have been ``passed`` are listed; a walk does not go on past one of them again.
+    """
+    (low, high), last, beyond = span, change.place, change.onward.place
+    near = SAME_CHANGE * float(place.sizes[0])
+    # Where a guard has no speed the parameter may stand still: that is no fold.
+    yield from _between(place, last, monitors, near)
+    met = (change.routes, last.value)
+    again = any(routes == met[0] and abs(value - met[1]) < near for routes, value in passed)
+    if not again and change.alters:
+        yield Event(change.kind, last, change.told, change)
+    if beyond is None or again:
+        return change.kind
+    if not low <= beyond.value <= high:
+        edge = at_value(beyond, low if beyond.value < low else high)
+        if edge is not None and is_real(edge.orbit):
+            yield from monitors.between(last, edge)
+            yield edge
+        return "range"
+    passed.append(met)
+    yield from monitors.between(last, beyond)
+    return beyond
 
 
 def _stands_still(trace: list[tuple[float, float, float]], place: Place) -> str:
@@ -226,6 +239,14 @@ def _comes_to_its_half(place: Place, after: Place) -> bool:
     if here is None or there is None or np.linalg.norm(here) <= SAME:
         return False
     return bool(here @ there < 0.0 or np.linalg.norm(there) <= SAME)
+
+
+def _to_its_half(place: Place, after: Place, low: float, high: float, monitors: Monitors) -> Iterator[Event]:
+    """What is met up to where the orbit becomes one of half the period."""
+    half = _halved(place, after)
+    if half is not None and low <= half.value <= high:
+        yield from monitors.between(place, half)
+        yield Event("flip", half, "the orbit has half the period: this branch begins here")
 
 
 def _halved(place: Place, after: Place) -> Place | None:
