@@ -132,7 +132,7 @@ def mode_at(orbit: Pass, i: int, share: float) -> str:
 def fundamental_at(orbit: Pass, i: int, share: float) -> np.ndarray:
     """The saltated fundamental matrix ``(n, n)`` over the period from a point within a stretch.
 
-    It is nan if the stretch cannot be run in two parts, as beside a touch.
+    It is nan if the stretch cannot be run in two parts, as beside a touch, or a jump has no derivative.
     """
     family, loop = orbit.family, orbit.loop
     (t, x), mode = moment(orbit, i, share), mode_at(orbit, i, share)
@@ -144,7 +144,9 @@ def fundamental_at(orbit: Pass, i: int, share: float) -> np.ndarray:
         last = family.flow(after, x[:n], t, float(end), loop.values).slopes[:, :n]
     except ArithmeticError:
         return np.full((n, n), np.nan)
-    matrix = orbit.saltations[i] @ last
-    for each in [*orbit.maps[i + 1 :], *orbit.maps[:i]]:
-        matrix = each @ matrix
-    return np.asarray(first @ matrix)
+    # Where a guard is crossed without speed a saltation matrix is infinite.
+    with np.errstate(all="ignore"):
+        matrix = orbit.saltations[i] @ last
+        for each in [*orbit.maps[i + 1 :], *orbit.maps[:i]]:
+            matrix = each @ matrix
+        return np.asarray(first @ matrix)
