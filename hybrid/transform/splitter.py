@@ -445,7 +445,12 @@ class Splitter:
         """The cells of the target mode that a jump may lead to, with its conditions."""
         choices = self._landings(cell, target, after)
         pieces = self.pieces[self.original.mode_index(target)]
-        return landed(pieces, choices, self._asked, lambda each: self._after_reset(each, after or ()))
+        for to, conditions in landed(
+            pieces, choices, self._asked, lambda each: self._after_reset(each, after or ())
+        ):
+            # A reset to a number decides conditions now.
+            if ZERO not in conditions:
+                yield to, [each for each in conditions if each.mask]
 
     def _landings(self, cell: Cell, target: str, after: list[Expression] | None) -> list[Choice]:
         """The cells of the target mode that the state after a reset may lie in."""
@@ -465,8 +470,8 @@ class Splitter:
         """The side of a surface on which a state lands from a cell, if it is always the same."""
         height = self._after_reset(self.surfaces.known[number].height, after)
         if not height.mask:
-            # On the surface itself the rules of an instant decide; the state may be on either side.
-            return -1 if float(height) < 0 else 1
+            # On the surface itself the flow decides.
+            return None if float(height) == 0 else -1 if float(height) < 0 else 1
         match = self.surfaces.match(height)
         if match is None:
             return None

@@ -96,3 +96,30 @@ def test_a_stop_that_holds_is_told_by_one_jump(solver):
     assert len(arc.jumps["go"]) > 5
     assert {jump.target for jump in arc.jumps["go"]} == {"moves: v<0"}
     assert np.diff(arc.jumps.t).min() > 0.0
+
+
+@SOLVERS
+def test_a_stop_that_takes_all_speed_lets_the_flow_decide(solver):
+    """A reset to a number on a surface: the mass sticks where friction holds it, or rubs on, in one jump."""
+    system = HybridSystem(
+        state=("q", "v"),
+        parameters={"A": 3.0, "mu": 0.5},
+        modes=[Mode("moves", lambda t, x, p: (x.v, p.A * np.cos(0.7 * t) - x.q - p.mu * np.sign(x.v)))],
+        transitions=[
+            Transition(
+                "moves",
+                "moves",
+                Guard(lambda t, x, p: x.q - 0.5, +1),
+                Reset(lambda t, x, p: (0.4, 0.0)),
+                name="hit",
+            )
+        ],
+    )
+    arc = simulate(split(system), (0.0, 0.1), (0.0, 40.0), solver=solver)
+    assert arc.status.ok, arc.status
+    hits = [jump for jump in arc.jumps if jump.transition.startswith("hit")]
+    for jump in hits:
+        force = 3.0 * np.cos(0.7 * jump.t) - 0.4
+        assert jump.target == ("v=0" if abs(force) <= 0.5 else "v>0")
+    assert {jump.target for jump in hits} == {"v=0", "v>0"}
+    assert np.diff(arc.jumps.t).min() > 0.0
