@@ -96,7 +96,7 @@ class Section(Asked):
             {"t": ("sample", self.t, names.of("t")), **names.coords()},
             attributes("section", self.status, self.system, self.parameters),
         )
-        return with_outputs(found, self.system, {"outputs": ("sample", self._table(self.system.outputs))})
+        return with_outputs(found, self.system, {"outputs": (("sample",), self._table(self.system.outputs))})
 
     def __repr__(self) -> str:
         return f"<Section of {counted(len(self), 'point')}, {self.status.brief}>"

@@ -262,7 +262,7 @@ class HybridArc(Asked):
         coords = {"t": ("t", self.t, names.of("t")), **names.coords()}
         made_by = attributes("arc", self.status, self.system, self.parameters)
         found = xarray.Dataset(variables, coords, made_by)
-        return with_outputs(found, self.system, {"outputs": ("t", self._table(self.system.outputs))})
+        return with_outputs(found, self.system, {"outputs": (("t",), self._table(self.system.outputs))})
 
     def __repr__(self) -> str:
         span = f"t = {self.t[0]:.6g} to {self.t[-1]:.6g}" if len(self.t) else "no points"
@@ -313,13 +313,13 @@ class HybridArc(Asked):
             raise ArgumentError(
                 f"t must lie in the run, [{self.t[0]}, {self.t[-1]}]; got {times.min()} to {times.max()}."
             )
-        states, modes = self._dense(inside.ravel())
+        states, modes = self.states_and_modes(inside.ravel())
         if name is None:
             return states.reshape(*times.shape, self.system.dimension)
         found = values_of(self.system, name, inside.ravel(), states, modes, self._values)
         return found.reshape(times.shape)
 
-    def _dense(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def states_and_modes(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """States ``(N, n)`` and indices of the modes ``(N,)`` at times in the run."""
         assert self._pieces is not None
         if len(self._pieces.t) == 0:

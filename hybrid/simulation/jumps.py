@@ -306,7 +306,7 @@ class Jumps(Sequence[Jump]):
         found = xarray.Dataset(variables, names.coords(), attributes("jumps", system=self.system))
         sides = {"outputs_minus": self.before, "outputs_plus": self.after}
         tables = {
-            variable: ("jump", np.array([side(name) for name in self.system.outputs]).T)
+            variable: (("jump",), np.array([side(name) for name in self.system.outputs]).T)
             for variable, side in sides.items()
         }
         return with_outputs(found, self.system, tables)

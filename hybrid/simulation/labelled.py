@@ -56,18 +56,17 @@ class Names:
 def with_outputs(
     dataset: xarray.Dataset,
     system: HybridSystem,
-    tables: Mapping[str, tuple[Any, np.ndarray]],
+    tables: Mapping[str, tuple[tuple[str, ...], np.ndarray]],
     names: Iterable[str] | None = None,
 ) -> xarray.Dataset:
     """The dataset with outputs of a system along the axis ``output``, if there are any: by default all.
 
-    Each table has the name of its variable, its axis besides, and values ``(N, outputs)``; without such an
-    axis, ``()``, they are ``(outputs,)``.
+    Each table has the name of its variable, its other axes, and values ``(..., outputs)``.
     """
     listed = [*(system.outputs if names is None else names)]
     if not listed:
         return dataset
-    named = {name: ((*([dim] if dim else []), "output"), values) for name, (dim, values) in tables.items()}
+    named = {name: ((*axes, "output"), values) for name, (axes, values) in tables.items()}
     return dataset.assign(named).assign_coords(output_coords(listed, system.units))
 
 

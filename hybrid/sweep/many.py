@@ -74,7 +74,7 @@ def simulate_many(
     samples
         Increasing times at which to store the state. A step ends at each of them.
     outputs
-        Names of outputs to compute at the ends.
+        Names of outputs to compute at the ends, and at the samples.
     executor
         Number of threads; by default all cores.
     progress
@@ -86,7 +86,8 @@ def simulate_many(
     xarray.Dataset
         Over the axis ``start``: ``x0`` and ``x_end`` (axis ``state``), ``t_end``, ``mode_end``, ``jumps``,
         ``status`` and ``message``; with samples also ``x`` (axes ``start``, ``t``, ``state``), nan after the
-        end of a run; with outputs also ``outputs_end`` (axis ``output``). The attributes tell how many
+        end of a run; with outputs also ``outputs_end`` (axis ``output``) and, with samples, ``outputs``
+        (axes ``start``, ``t``, ``output``). The attributes tell how many
         ``steps_together`` and ``steps_alone`` the runs took.
 
     Raises
@@ -116,7 +117,7 @@ def simulate_many(
     overrides = named("parameters", parameters)
     mode = starting_mode(system, mode)
     options = {"mode": mode, "parameters": overrides, "solver": check_solver(solver)}
-    found = _Found(origins, times, t1)
+    found = _Found(origins, times, t1, system.mode_names)
     if system.growth is not None or (mode is not None and len(system.parts_of(mode)) > 1):
         work: Any = _OneByOne(system, (t0, t1), options, most, found)
     else:
@@ -125,10 +126,12 @@ def simulate_many(
         run_in_blocks(work.run, len(origins), threads, bar)
         # An interrupt that came too late to stop anything is not raised either.
         CTRL_C.is_set()
-    made = found.dataset(system, overrides)
-    return with_outputs(
-        made, system, {"outputs_end": ("start", found.outputs(system, asked, overrides))}, asked
-    )
+    grown = system if system.growth is None else system.growth.current
+    table = found.outputs(grown, asked, grown.parameter_values(parameters))
+    tables: dict[str, Any] = {"outputs_end": (("start",), table[:, -1])}
+    if len(times):
+        tables["outputs"] = (("start", "t"), table[:, :-1])
+    return with_outputs(found.dataset(system, overrides), system, tables, asked)
 
 
 def _origins(system: HybridSystem, x0: Any) -> np.ndarray:
@@ -154,13 +157,15 @@ def _origins(system: HybridSystem, x0: Any) -> np.ndarray:
 class _Found:
     """The results, which threads fill in."""
 
-    def __init__(self, origins: np.ndarray, times: np.ndarray, t1: float) -> None:
+    def __init__(self, origins: np.ndarray, times: np.ndarray, t1: float, mode_names: Iterable[str]) -> None:
         count, n = origins.shape
         self.origins, self.times, self.t1 = origins, times, t1
+        # A system that grows adds to them.
+        self.mode_names = [*mode_names]
         # The last time is the end.
         self.states = np.full((count, len(times) + 1, n), np.nan)
+        self.modes = np.full(self.states.shape[:2], codes.NO_MODE, dtype=np.int64)
         self.t_end = np.full(count, np.nan)
-        self.mode = np.full(count, "", dtype=object)
         self.jumps = np.zeros(count, dtype=np.int64)
         self.codes = np.full(count, StatusCode.NOT_RUN, dtype=np.int16)
         self.messages = np.full(count, UNTOUCHED, dtype=object)
@@ -171,15 +176,18 @@ class _Found:
         """Keep how a run ended."""
         self.codes[i], self.messages[i] = status.code, text_of(status)
 
-    def outputs(
-        self, system: HybridSystem, names: tuple[str, ...], parameters: Mapping[str, float]
-    ) -> np.ndarray:
-        """Outputs at the ends ``(N, len(names))``; nan where a run has none."""
-        if system.growth is not None:
-            system = system.growth.current
-        table, ended = np.full((len(self.mode), len(names)), np.nan), np.flatnonzero(self.mode != "")
-        modes, values = mode_indices(system, self.mode[ended]), system.parameter_values(parameters)
-        table[ended] = table_of(system, names, self.t_end[ended], self.states[ended, -1], modes, values)
+    def mode_index(self, name: str) -> int:
+        """The index of a mode among ``mode_names``."""
+        if name not in self.mode_names:
+            self.mode_names.append(name)
+        return self.mode_names.index(name)
+
+    def outputs(self, system: HybridSystem, names: tuple[str, ...], values: np.ndarray) -> np.ndarray:
+        """Outputs at the samples and the end ``(N, S + 1, len(names))``; nan where a run has none."""
+        times = np.column_stack([np.tile(self.times, (len(self.t_end), 1)), self.t_end])
+        table, reached = np.full((*times.shape, len(names)), np.nan), self.modes != codes.NO_MODE
+        modes = mode_indices(system, np.array(self.mode_names)[self.modes[reached]])
+        table[reached] = table_of(system, names, times[reached], self.states[reached], modes, values)
         return table
 
     def dataset(self, system: HybridSystem, parameters: Mapping[str, float]) -> xarray.Dataset:
@@ -191,7 +199,7 @@ class _Found:
             "x0": (("start", "state"), self.origins, names.states),
             "x_end": (("start", "state"), self.states[:, -1], names.states),
             "t_end": ("start", self.t_end, names.of("t")),
-            "mode_end": ("start", self.mode),
+            "mode_end": ("start", np.array([*self.mode_names, ""], dtype=object)[self.modes[:, -1]]),
             "jumps": ("start", self.jumps),
         }
         coords = {"start": np.arange(len(self.origins)), **names.coords()}
@@ -235,9 +243,11 @@ class _OneByOne:
                 found.tell(i, Status(StatusCode.FAILED, str(failure)))
                 continue
             reached = found.times[found.times <= arc.t[-1]]
-            found.states[i, : len(reached)] = arc(reached)
+            modes = np.array([found.mode_index(name) for name in arc.system.mode_names])
+            found.states[i, : len(reached)], places = arc.states_and_modes(reached)
+            found.modes[i, : len(reached)] = modes[places]
             found.states[i, -1], found.t_end[i] = arc.x[-1], arc.t[-1]
-            found.mode[i], found.jumps[i] = str(arc.mode[-1]), arc.jump_count
+            found.modes[i, -1], found.jumps[i] = found.mode_index(str(arc.mode[-1])), arc.jump_count
             found.tell(i, arc.status)
 
 
@@ -275,15 +285,20 @@ class _Runs:
         if CTRL_C.is_set():
             return
         plan, found, part = self.plan, self.found, slice(block.start, block.stop)
-        origins, states = found.origins[part], found.states[part]
-        places = np.zeros((len(block), 3), dtype=np.int64)
+        origins, states, modes = found.origins[part], found.states[part], found.modes[part]
+        jumps = np.zeros((len(block), 1), dtype=np.int64)
         (t0, t1), count = self.t_span, min(len(block), TOGETHER)
         model = self.compiled.own(self.model)
         memories, phase0 = berths(plan, model, count, origins[0], t0, t1 - t0)
         queue, counters = np.zeros(1, dtype=np.int64), np.zeros((count, 1), dtype=np.int64)
-        starts = [starts_of(each, origins, queue, named=self.named, found=places) for each in memories]
+        starts = [starts_of(each, origins, queue, named=self.named, found=jumps) for each in memories]
         common = Sampled(
-            counters=counters[0], starts=starts[0], cycles=self.cycles, phases=self.phases, states=states
+            counters=counters[0],
+            starts=starts[0],
+            cycles=self.cycles,
+            phases=self.phases,
+            states=states,
+            modes=modes,
         )
         jobs = [common.replace(counters=counters[i], starts=each) for i, each in enumerate(starts)]
         tasks = [each.task(model, orthonormal=False) for each in memories]
@@ -324,8 +339,7 @@ class _Runs:
             plain = Status(StatusCode.SUCCESS, "Reached the end.")
             found.codes[rows], found.messages[rows] = plain.code, text_of(plain)
             found.t_end[rows] = found.t1
-            found.mode[rows] = np.array(self.system.mode_names, dtype=object)[places[done, 0]]
-            found.jumps[rows] = places[done, 1]
+            found.jumps[rows] = jumps[done, 0]
         for each in memories:
             plan.take_back(each)
 
@@ -337,5 +351,5 @@ class _Runs:
             trajectory = attrs.evolve(trajectory, beyond=beyond)
         found.states[i, -1] = trajectory.x
         found.t_end[i] = found.t1 if code == codes.DONE else trajectory.t
-        found.mode[i], found.jumps[i] = trajectory.mode, trajectory.jumps
+        found.modes[i, -1], found.jumps[i] = found.mode_index(trajectory.mode), trajectory.jumps
         found.tell(i, status_of(trajectory, code))

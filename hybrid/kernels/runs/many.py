@@ -104,10 +104,10 @@ def sampled(parts, task, crew, r, code):
     if code == DONE:
         for c in range(task.model.dimension):
             job.states[i, s, c] = run.y[c]
+        job.modes[i, s] = run.mode
         s += 1
-        starts.found[i, 2] = s
         if s > last:
-            starts.found[i, 0], starts.found[i, 1] = run.mode, run.jumps
+            starts.found[i, 0] = run.jumps
             if not ends_plainly(task.model, run, guards_beyond(starts.named, starts.verdicts)):
                 return DONE
     if code == GO_ON or s > last:

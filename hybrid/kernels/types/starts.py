@@ -27,9 +27,9 @@ class Starts(Structure, counters=("now",)):
 
 
 class Sampled(Structure, counters=("sample",)):
-    """Runs whose states ``(N, S, n)`` are kept at ``S`` times, the last one their end; next is ``sample``.
+    """Runs whose states ``(N, S, n)`` and modes are kept at ``S`` times, the last one the end.
 
-    ``starts.found (N, 3)`` gets the mode, the number of jumps and the number of states reached.
+    The next time is ``sample``; ``starts.found (N, 1)`` gets the number of jumps.
     """
 
     counters: INDICES
@@ -37,6 +37,7 @@ class Sampled(Structure, counters=("sample",)):
     cycles: INDICES
     phases: VECTOR
     states: CUBE
+    modes: INDEX_MATRIX
 
 
 class Settling(Structure):

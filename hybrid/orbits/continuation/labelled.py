@@ -67,7 +67,7 @@ def dataset_of(branch: Any) -> xarray.Dataset:
     asked = {"measured": json.dumps([*branch.outputs]), "events": json.dumps([*branch.events])}
     made = xarray.Dataset(variables, coords, {**made_by, "parameter": branch.name, **asked})
     tables = {
-        "outputs": ("point", branch._table(branch.system.outputs)),
-        "outputs_there": ("bifurcation", table_at(branch.system, [*branch.system.outputs], orbits)),
+        "outputs": (("point",), branch._table(branch.system.outputs)),
+        "outputs_there": (("bifurcation",), table_at(branch.system, [*branch.system.outputs], orbits)),
     }
     return sealed(with_outputs(made, branch.system, tables))

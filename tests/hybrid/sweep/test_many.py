@@ -7,7 +7,17 @@ import pytest
 
 import hybrid
 import models
-from hybrid import ArgumentError, StatusCode, simulate, simulate_many
+from hybrid import (
+    ArgumentError,
+    Guard,
+    HybridSystem,
+    Mode,
+    StatusCode,
+    Transition,
+    simulate,
+    simulate_many,
+    split,
+)
 from hybrid.sweep import many
 from hybrid.sweep.outcome import text_of
 from hybrid.transform import splitter
@@ -266,3 +276,40 @@ def test_what_a_status_tells_is_told_of_many_runs_too(made, ok, told):
     assert (found.status.values == StatusCode.SUCCESS).tolist() == [ok, ok]
     assert all(told in message for message in found.message.values)
     assert_one_by_one(found, system, [x0, x0], span, mode=mode)
+
+
+@pytest.mark.parametrize("divided", [False, True], ids=["whole", "split"])
+def test_outputs_at_samples(divided):
+    """Outputs at the samples are those of a run alone, also of one that does not get that far."""
+    system = HybridSystem(
+        state=("q", "v"),
+        modes=[
+            Mode("flight", lambda t, x, p: (x.v, -1.0 - 0.1 * np.sign(x.v) * x.v**2)),
+            Mode("contact", lambda t, x, p: (x.v, -1.0 - 40.0 * x.q)),
+        ],
+        transitions=[
+            Transition("flight", "contact", Guard(lambda t, x, p: x.q, -1)),
+            Transition("contact", "flight", Guard(lambda t, x, p: x.q, +1)),
+            Transition("flight", None, Guard(lambda t, x, p: x.q - 3.0, +1)),
+        ],
+        start="flight",
+        outputs={
+            "force": {"contact": lambda t, x, p: -40.0 * x.q},
+            "energy": lambda t, x, p: x.v**2 / 2 + x.q,
+        },
+    )
+    system = split(system) if divided else system
+    times, starts = np.linspace(0.0, 4.0, 21), np.array([[1.0, 0.0], [0.5, 0.3], [2.0, 3.0]])
+    names = ("force", "energy")
+    found = simulate_many(system, starts, (0.0, 4.0), samples=times, outputs=names)
+    assert found.outputs.dims == ("start", "t", "output")
+    assert list(found.output.values) == [*names]
+    for i, start in enumerate(starts):
+        arc = simulate(system, start, (0.0, 4.0))
+        reached = times <= arc.t[-1]
+        alone = np.column_stack([arc(times[reached], name) for name in names])
+        np.testing.assert_allclose(found.outputs[i, reached], alone, rtol=1e-7, atol=1e-7)
+        assert np.isnan(found.outputs[i, ~reached]).all()
+        assert found.mode_end[i] == arc.mode[-1]
+    assert np.isnan(found.outputs.sel(output="energy")).any()
+    assert (~np.isnan(found.outputs.sel(output="force"))).any()
