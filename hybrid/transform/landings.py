@@ -34,6 +34,15 @@ def landed(
     height_of
         What has the sign of the height of a surface.
     """
+    for cell, conditions in _possible(pieces, choices, height_of, after):
+        # A reset to a number decides conditions now.
+        if ZERO not in conditions:
+            yield cell, [each for each in conditions if each.mask]
+
+
+def _possible(
+    pieces: Pieces, choices: Sequence[Choice], height_of: Callable[[int], Expression], after: After
+) -> Iterator[tuple[Cell, list[Expression]]]:
     for choice in choices:
         if len(choice.chosen) != 1 or not _is_plain(pieces, choice):
             yield choice.cell, [on_side(after(height_of(number)), side) for number, side in choice.chosen]

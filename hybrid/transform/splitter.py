@@ -445,12 +445,7 @@ class Splitter:
         """The cells of the target mode that a jump may lead to, with its conditions."""
         choices = self._landings(cell, target, after)
         pieces = self.pieces[self.original.mode_index(target)]
-        for to, conditions in landed(
-            pieces, choices, self._asked, lambda each: self._after_reset(each, after or ())
-        ):
-            # A reset to a number decides conditions now.
-            if ZERO not in conditions:
-                yield to, [each for each in conditions if each.mask]
+        return landed(pieces, choices, self._asked, lambda each: self._after_reset(each, after or ()))
 
     def _landings(self, cell: Cell, target: str, after: list[Expression] | None) -> list[Choice]:
         """The cells of the target mode that the state after a reset may lie in."""
