@@ -22,6 +22,9 @@ from hybrid.orbits.continuation.continue_bifurcation import (
 from hybrid.orbits.continuation.continue_orbit import continue_orbit
 from hybrid.orbits.continuation.saved import open_branch
 from hybrid.orbits.continuation.switch_branch import switch_branch
+from hybrid.orbits.equilibria.branch import EquilibriumBifurcation, EquilibriumBranch
+from hybrid.orbits.equilibria.continue_equilibrium import continue_equilibrium
+from hybrid.orbits.equilibria.equilibrium import Equilibrium, equilibrium
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.periodic_orbit import periodic_orbit
 from hybrid.orbits.sections import Section, poincare_section, stroboscopic_section
@@ -63,6 +66,9 @@ __all__ = [
     "Branch",
     "CodimensionTwo",
     "CompiledSystem",
+    "Equilibrium",
+    "EquilibriumBifurcation",
+    "EquilibriumBranch",
     "Every",
     "GlobalError",
     "Grazing",
@@ -91,7 +97,9 @@ __all__ = [
     "basins",
     "compile_system",
     "continue_bifurcation",
+    "continue_equilibrium",
     "continue_orbit",
+    "equilibrium",
     "filippov",
     "from_equations",
     "global_error",

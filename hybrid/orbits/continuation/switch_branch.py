@@ -11,6 +11,9 @@ from hybrid.orbits.continuation.branch import Bifurcation
 from hybrid.orbits.continuation.crossing import crossing
 from hybrid.orbits.continuation.place import place_on
 from hybrid.orbits.continuation.result import Points, orbit_of
+from hybrid.orbits.equilibria.branch import EquilibriumBifurcation
+from hybrid.orbits.equilibria.equilibrium import Equilibrium
+from hybrid.orbits.equilibria.switching import switched
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import Solver, Taylor
@@ -19,24 +22,30 @@ from hybrid.solvers import Solver, Taylor
 TIMES = {"flip": 2, "branch point": 1}
 
 
-def switch_branch(bifurcation: Bifurcation, *, solver: Solver | None = None) -> PeriodicOrbit:
+def switch_branch(
+    bifurcation: Bifurcation | EquilibriumBifurcation, *, solver: Solver | None = None
+) -> PeriodicOrbit | Equilibrium:
     """An orbit on the branch that begins at a flip, or crosses at a branch point; continue it from there.
 
     It is a small distance from the bifurcation along the direction in which the equations of the orbit are
     singular: at a flip the eigenvector of the multiplier -1, for the orbit of twice the period. Where the
     sequence of transitions changes it is the orbit with the new sequence.
 
+    At a Hopf point of an equilibrium it is a small cycle, at a branch point an equilibrium on the other
+    branch, and at a boundary the equilibrium of another mode, where it is admissible.
+
     Parameters
     ----------
     bifurcation
-        Of a `Branch`: a ``"flip"``, a ``"branch point"``, or a change of the transitions.
+        Of a `Branch`: a ``"flip"``, a ``"branch point"``, or a change of the transitions. Of an
+        `EquilibriumBranch`: a ``"Hopf"`` point, a ``"branch point"``, or a ``"boundary"``.
     solver
         Method and tolerances, by default ``Taylor(rtol=1e-12, atol=1e-14)``.
 
     Returns
     -------
-    PeriodicOrbit
-        For `continue_orbit`.
+    PeriodicOrbit or Equilibrium
+        For `continue_orbit` or `continue_equilibrium`.
 
     Raises
     ------
@@ -56,8 +65,10 @@ def switch_branch(bifurcation: Bifurcation, *, solver: Solver | None = None) -> 
     >>> free.status.ok, len(free.arc().jumps)
     (True, 0)
     """
-    arguments.instance("bifurcation", bifurcation, Bifurcation, "Take one of branch.bifurcations.")
     method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
+    if isinstance(bifurcation, EquilibriumBifurcation):
+        return switched(bifurcation, method)
+    arguments.instance("bifurcation", bifurcation, Bifurcation, "Take one of branch.bifurcations.")
     if bifurcation.kind not in TIMES:
         beyond = None if bifurcation._change is None else bifurcation._change.onward.place
         if beyond is None:

@@ -1,0 +1,1 @@
+"""Equilibria of modes, their branches over a parameter, and the bifurcations on them."""

@@ -1,0 +1,169 @@
+"""A branch of equilibria over a parameter, and the bifurcations on it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from hybrid import arguments
+from hybrid.display.tables import counted
+from hybrid.orbits.equilibria.equations import Equations
+from hybrid.orbits.equilibria.equilibrium import Equilibrium, described
+from hybrid.simulation.labelled import Names, attributes, with_outputs
+from hybrid.simulation.quantities import Asked, table_of
+from hybrid.status import Status
+from hybrid.system.graph import HybridSystem
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@attrs.frozen(eq=False)
+class EquilibriumBifurcation:
+    """Where a branch of equilibria changes.
+
+    Attributes
+    ----------
+    kind
+        ``"fold"``, ``"Hopf"``, ``"branch point"``, or ``"boundary"``, where the equilibrium reaches a guard.
+    parameter, value
+        Name of the parameter, and its value there.
+    equilibrium
+        The equilibrium there.
+    message
+        What happens, in words: of a Hopf point which side the cycles are on and whether they attract, of a
+        boundary whether the equilibrium goes on in another mode (persistence) or meets one of another mode
+        and vanishes with it (nonsmooth fold).
+    stable
+        Whether the equilibria before and after it along the branch are stable; None where the branch ends.
+    coefficient
+        Of a Hopf point the first Lyapunov coefficient, of a fold ``a`` of its normal form, with eigenvectors
+        of length 1 (Kuznetsov, sections 5.4 and 3.3). None for other kinds.
+    period
+        Of a Hopf point the period of the smallest cycles; else None.
+    modes
+        Of a boundary the other modes that have an equilibrium there.
+    """
+
+    kind: str
+    parameter: str
+    value: float
+    equilibrium: Equilibrium
+    message: str
+    stable: tuple[bool | None, bool | None]
+    coefficient: float | None = None
+    period: float | None = None
+    modes: tuple[str, ...] = ()
+    _place: Any = attrs.field(default=None, repr=False)
+
+    def __str__(self) -> str:
+        return f"{self.kind} at {self.parameter} = {self.value:.10g}: {self.message}"
+
+
+@attrs.frozen(eq=False, repr=False)
+class EquilibriumBranch(Asked):
+    """Equilibria of one mode in order along a branch.
+
+    ``branch["q"]`` is a component of the states, or an output there, ``(N,)``.
+
+    Attributes
+    ----------
+    system, name
+        The model, and the name of the parameter.
+    mode
+        The mode.
+    parameter
+        Values of the parameter, ``(N,)``.
+    x
+        The states, ``(N, n)``.
+    eigenvalues
+        As those of :class:`hybrid.Equilibrium`, ``(N, k)``.
+    stable, admissible
+        Whether no eigenvalue has a positive real part, and whether no guard of the mode excludes the state,
+        ``(N,)``.
+    bifurcations
+        Each :class:`hybrid.EquilibriumBifurcation`, in order along the branch.
+    status
+        Why the branch ends where it does.
+    """
+
+    system: HybridSystem
+    name: str
+    mode: str
+    parameter: np.ndarray
+    x: np.ndarray
+    eigenvalues: np.ndarray
+    stable: np.ndarray
+    admissible: np.ndarray
+    bifurcations: tuple[EquilibriumBifurcation, ...]
+    status: Status
+    _equations: Equations
+
+    def equilibrium(self, i: int) -> Equilibrium:
+        """The equilibrium of a point of the branch.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no such point.
+        """
+        i = arguments.index("i", i, len(self))
+        return described(self._equations, np.append(self.x[i, : self._equations.n], self.parameter[i]))
+
+    def of(self, kind: str) -> tuple[EquilibriumBifurcation, ...]:
+        """The bifurcations of a kind, in order.
+
+        Raises
+        ------
+        ArgumentError
+            If there is no such kind.
+        """
+        arguments.known("kind: Kind", kind, KINDS, "Kinds")
+        return tuple(each for each in self.bifurcations if each.kind == kind)
+
+    def __len__(self) -> int:
+        return len(self.parameter)
+
+    def _table(self, names: Iterable[str]) -> np.ndarray:
+        """Components and outputs at the states, ``(N, len(names))``."""
+        values = np.tile(self._equations.vector, (len(self), 1))
+        values[:, self._equations.places[0]] = self.parameter
+        modes = np.full(len(self), self.system.mode_index(self.mode))
+        return table_of(self.system, [*names], np.zeros(len(self)), self.x, modes, values)
+
+    def __repr__(self) -> str:
+        values = self.parameter
+        span = f"{self.name} = {values.min():.6g} to {values.max():.6g}"
+        kinds = ", ".join(each.kind for each in self.bifurcations) or "no bifurcations"
+        count = counted(len(self), "point")
+        return f"<EquilibriumBranch in {self.mode!r}, {span}, {count}, {kinds}, {self.status.brief}>"
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The branch over the axis ``point``, with the parameter as a coordinate, and its bifurcations.
+
+        Eigenvalues are complex: ``.to_zarr`` saves them, netCDF cannot.
+        """
+        import xarray
+
+        names, found = Names(self.system.state_names, self.system.units), self.bifurcations
+        there = np.array([each.equilibrium.x for each in found]).reshape(-1, self.system.dimension)
+        variables: dict[str, Any] = {
+            "x": (("point", "state"), self.x, names.states),
+            "eigenvalues": (("point", "eigenvalue"), self.eigenvalues),
+            "stable": ("point", self.stable),
+            "admissible": ("point", self.admissible),
+            "kind": ("bifurcation", np.array([each.kind for each in found], dtype=str)),
+            "value": ("bifurcation", np.array([each.value for each in found]), names.of(self.name)),
+            "message": ("bifurcation", np.array([each.message for each in found], dtype=str)),
+            "x_there": (("bifurcation", "state"), there, names.states),
+        }
+        coords = {self.name: ("point", self.parameter, names.of(self.name)), **names.coords()}
+        made_by = attributes("branch of equilibria", self.status, self.system, self.equilibrium(0).parameters)
+        made = xarray.Dataset(variables, coords, {**made_by, "parameter": self.name, "mode": self.mode})
+        return with_outputs(made, self.system, {"outputs": (("point",), self._table(self.system.outputs))})
+
+
+KINDS = ("fold", "Hopf", "branch point", "boundary")

@@ -1,0 +1,370 @@
+"""The branch of an equilibrium over a parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import combinations
+
+import attrs
+import numpy as np
+
+from hybrid import arguments
+from hybrid.compiler.interrupts import CTRL_C
+from hybrid.display.progress import Progress, progress_bar
+from hybrid.errors import ArgumentError
+from hybrid.orbits.equilibria.boundary import neighbour_of, neighbours, told
+from hybrid.orbits.equilibria.branch import EquilibriumBifurcation, EquilibriumBranch
+from hybrid.orbits.equilibria.curve import Spot, spot_at, walk, zero_between
+from hybrid.orbits.equilibria.equations import Barrier, Equations, Reduced, reduced, sizes_of
+from hybrid.orbits.equilibria.equilibrium import Equilibrium, described, eigenvalues_of, is_stable
+from hybrid.orbits.equilibria.normal_forms import branch_point_near, critical_pair, fold_at, hopf_at
+from hybrid.simulation.interrupt import interrupted_status
+from hybrid.status import SUCCESS, Status, StatusCode
+
+ENDS = {
+    "range": "the end of the range",
+    "closed": "its start: it is closed",
+    "infinity": "a state that grows without bound",
+    "most": "the limit of steps",
+    "lost": "a point beyond which Newton's method finds none",
+}
+# Equilibria come in families where a singular value is below this share of the largest.
+FAMILY = 1e-10
+# The real part of a pair at a Hopf point, as a share of its imaginary part, at most.
+ON_THE_AXIS = 1e-6
+
+
+def continue_equilibrium(
+    point: Equilibrium,
+    parameter: str,
+    span: tuple[float, float],
+    *,
+    max_steps: int = 2000,
+    progress: bool | None = None,
+) -> EquilibriumBranch:
+    """The branch of an equilibrium over a parameter, both ways, and the bifurcations on it.
+
+    Steps are taken along the branch (pseudo-arclength), so that it may turn back at folds. The branch is that
+    of one mode: where the equilibrium passes a guard it goes on as a virtual one, with
+    ``branch.admissible`` false. `switch_branch` goes from a bifurcation to the equilibria of another mode,
+    to the branch that crosses, or to the cycles that begin at a Hopf point.
+
+    Parameters
+    ----------
+    point
+        From `equilibrium`.
+    parameter
+        Name of the parameter.
+    span
+        ``(low, high)``, which contains the value of the point.
+    max_steps
+        Largest number of steps in either direction.
+    progress
+        Whether to show a progress bar; by default in a terminal or a notebook, after two seconds.
+
+    Returns
+    -------
+    EquilibriumBranch
+        With a status; if it is interrupted or lost it keeps what there is.
+
+    Raises
+    ------
+    ArgumentError
+        If the point has not converged, the parameter does not exist, the span does not contain its value, or
+        equilibria come in families, such as all states at rest of a mass that friction holds.
+
+    References
+    ----------
+    Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, 4th ed., Springer 2023, chapter 10.
+    M. di Bernardo, C. Budd, A. Champneys, P. Kowalczyk, Piecewise-smooth Dynamical Systems, Springer 2008,
+    section 5.1: persistence and nonsmooth folds of boundary equilibria.
+
+    Examples
+    --------
+    >>> import hybrid
+    >>> bead = hybrid.HybridSystem(
+    ...     state=("a", "b"),
+    ...     parameters={"r": -1.0},
+    ...     modes=[
+    ...         hybrid.Mode(
+    ...             "flow",
+    ...             lambda t, x, p: (
+    ...                 p.r * x.a - 2 * x.b - x.a * (x.a**2 + x.b**2),
+    ...                 2 * x.a + p.r * x.b - x.b * (x.a**2 + x.b**2),
+    ...             ),
+    ...         )
+    ...     ],
+    ... )
+    >>> rest = hybrid.equilibrium(bead, (0.1, 0.1))
+    >>> [hopf] = hybrid.continue_equilibrium(rest, "r", (-1.0, 1.0)).of("Hopf")
+    >>> abs(hopf.value) < 1e-10, round(hopf.coefficient, 6), round(hopf.period, 6)
+    (True, -1.0, 3.141593)
+    """
+    arguments.instance("point", point, Equilibrium, "Call equilibrium first.")
+    if not point.status.ok:
+        raise ArgumentError(f"point has not converged: {point.status.message}")
+    arguments.known("parameter: Parameter", parameter, point.system.parameters, "Parameters")
+    ends = arguments.numbers("span", span, "be (low, high)")
+    if ends.shape != (2,) or not np.all(np.isfinite(ends)):
+        raise arguments.refusal("span", "be (low, high)", span)
+    low, high = ends.tolist()
+    value = point.parameters[parameter]
+    if arguments.within(np.array([value]), low, high) is None or not low < high:
+        raise ArgumentError(
+            f"span must be (low, high) around {parameter} = {value}; got {arguments.shown(span)}."
+        )
+    most = arguments.count("max_steps", max_steps, 1)
+    progress = None if progress is None else arguments.flag("progress", progress)
+    vector = point.system.parameter_values(point.parameters)
+    equations = Equations(point.system, point.mode, (parameter,), point.x, vector)
+    with CTRL_C, progress_bar(None, "Branch", progress, "point") as bar:
+        items, why = _both_ways(equations, min(low, value), max(high, value), most, bar)
+        interrupted = CTRL_C.is_set()
+    status = interrupted_status("the equilibria so far") if interrupted else _status(why)
+    return _branch_of(equations, items, status)
+
+
+Item = Spot | tuple[str, Spot, Barrier | None]
+
+
+def _both_ways(
+    equations: Equations, low: float, high: float, most: int, bar: Progress
+) -> tuple[list[Item], list[str]]:
+    """The points and bifurcations of a branch in order, and why it ends on either side."""
+    begin = _first(equations, high - low)
+    items: list[Item] = [begin]
+    why: list[str] = []
+    for sign in (-1.0, 1.0):
+        items = items[::-1]
+        spot = before = attrs.evolve(begin, tangent=sign * begin.tangent)
+        with CTRL_C.ending():
+            for item in walk(spot, equations.n, low, high, most, partial(_renewed, equations)):
+                if isinstance(item, str):
+                    why.append(item)
+                    break
+                after = attrs.evolve(item, units=before.units) if item is begin else item
+                items += [*_between(equations, before, after), item]
+                before = _renewed(equations, item)
+                bar.update(True)
+                if CTRL_C.is_set():
+                    break
+        if CTRL_C.is_set() or why[-1:] == ["closed"]:
+            break
+    return items, why
+
+
+def _first(equations: Equations, reach: float) -> Spot:
+    """The first point, towards larger values of the parameter."""
+    u = equations.start()
+    part, n = reduced(equations, u), equations.n
+    rows = part.jacobian(u)
+    # A unit of the state is how far the equilibrium moves over the range, or how large it is.
+    moved = np.abs(np.linalg.lstsq(rows[:, :n], -rows[:, n], rcond=FAMILY)[0]) * reach
+    least = np.maximum(np.abs(u[:n]), np.minimum(moved, _largest(u[:n], moved)))
+    units = np.append(sizes_of(equations.matrix(u), least), reach)
+    scaled = rows * units
+    lengths = np.linalg.norm(scaled, axis=1)
+    values = np.linalg.svd(scaled / np.where(lengths == 0.0, 1.0, lengths)[:, None], compute_uv=False)
+    if n and values[-1] <= FAMILY * values[0]:
+        raise ArgumentError(
+            f"point is one of a family: other equilibria of mode {equations.mode!r} are beside it at the "
+            "same parameters, so there is no branch over one. Hold what tells them apart (held=), or choose "
+            "a mode in which the equilibrium is alone."
+        )
+    spot = spot_at(part, u, units, np.eye(n + 1)[n])
+    if spot is None or spot.tangent[n] == 0.0:
+        _, _, right = np.linalg.svd(scaled)
+        spot = spot_at(part, u, units, right[-1])
+    assert spot is not None, "a regular point has a tangent"
+    return spot
+
+
+def _largest(x: np.ndarray, moved: np.ndarray) -> float:
+    """A bound of the units near a fold, where an equilibrium moves without bound."""
+    size = float(np.abs(x).max(initial=0.0))
+    return 10.0 * size if size else float(moved.max(initial=0.0))
+
+
+def _renewed(equations: Equations, spot: Spot) -> Spot:
+    """A point with the surfaces of the mode as they are there, and units that have grown with the state."""
+    assert isinstance(spot.system, Reduced)
+    units = np.maximum(spot.units, np.append(np.abs(spot.u[:-1]), 0.0))
+    part = Reduced(equations, equations.basis(spot.u, spot.system.basis))
+    return spot_at(part, spot.u, units, spot.tangent * spot.units / units) or spot
+
+
+def _between(equations: Equations, spot: Spot, after: Spot) -> list[Item]:
+    """The bifurcations between two points, in order."""
+    found: list[tuple[str, Spot, Barrier | None]] = []
+    changed = [kind for kind, function in TESTS.items() if _changes(function, spot, after)]
+    if "branch point" in changed and "fold" in changed:
+        # A branch that crosses another one at its turn, as the arms of a pitchfork do.
+        changed.remove("fold")
+    for kind in changed:
+        there = _crossing(spot, after) if kind == "branch point" else zero_between(spot, after, TESTS[kind])
+        if there is not None and (kind != "Hopf" or _is_hopf(equations, there)):
+            found.append((kind, there, None))
+    for barrier in equations.barriers:
+        there = _met(equations, barrier, spot, after)
+        if there is not None:
+            found.append(("boundary", there, barrier))
+    return sorted(_each_once(found), key=lambda item: spot.distance(item[1]))
+
+
+def _each_once(found: list[tuple[str, Spot, Barrier | None]]) -> Iterator[tuple[str, Spot, Barrier | None]]:
+    """Boundaries at one point, of several guards on one surface, as the first of them."""
+    met: list[Spot] = []
+    for kind, spot, barrier in found:
+        if kind == "boundary":
+            if any(np.all(np.abs(spot.u - each.u) <= ON_THE_AXIS * spot.units) for each in met):
+                continue
+            met.append(spot)
+        yield kind, spot, barrier
+
+
+def _changes(function: Callable[[Spot], float], spot: Spot, after: Spot) -> bool:
+    one, other = function(spot), function(after)
+    return bool(one * other < 0.0 or (other == 0.0 and one != 0.0))
+
+
+def _fold(spot: Spot) -> float:
+    """Zero where the branch turns back."""
+    return float(spot.tangent[-1])
+
+
+def _branch_point(spot: Spot) -> float:
+    """Zero where another branch crosses."""
+    return float(np.linalg.det(spot.matrix))
+
+
+def _hopf(spot: Spot) -> float:
+    """Zero where two eigenvalues have the sum zero: the product of all sums of two, each by its size."""
+    assert isinstance(spot.system, Reduced)
+    own = eigenvalues_of(spot.system.equations.within(spot.u))
+    product = 1.0 + 0.0j
+    for one, other in combinations(own, 2):
+        size = abs(one) + abs(other)
+        product *= (one + other) / size if size else 0.0
+    return float(product.real) if len(own) > 1 else 1.0
+
+
+TESTS: dict[str, Callable[[Spot], float]] = {"fold": _fold, "branch point": _branch_point, "Hopf": _hopf}
+
+
+def _is_hopf(equations: Equations, spot: Spot) -> bool:
+    """Whether the two eigenvalues are a pair on the imaginary axis, and not a saddle's."""
+    pair = critical_pair(equations.within(spot.u))
+    return bool(abs(pair.real) <= ON_THE_AXIS * pair.imag)
+
+
+def _crossing(spot: Spot, after: Spot) -> Spot | None:
+    """The branch point between two points."""
+    assert isinstance(spot.system, Reduced)
+    ends = [_branch_point(spot), _branch_point(after)]
+    share = ends[0] / (ends[0] - ends[1])
+    u = branch_point_near(spot.system, spot.u + share * (after.u - spot.u), spot.units)
+    if u is None or np.abs((u - spot.u) / spot.units).max() > 2.0 * spot.distance(after):
+        return None
+    return attrs.evolve(spot, u=u)
+
+
+def _met(equations: Equations, barrier: Barrier, spot: Spot, after: Spot) -> Spot | None:
+    """The point between two at which the state is on a guard."""
+
+    def height(each: Spot) -> float:
+        return barrier.height_beside(equations.known(each.u), each.units)
+
+    if not _changes(height, spot, after):
+        return None
+    there: Spot | None = after
+    if height(after):
+        there = zero_between(
+            spot, after, lambda each: float(barrier.height.value(equations.known(each.u))[0])
+        )
+    return there if there is not None and barrier.counts(equations.known(there.u)) else None
+
+
+def _branch_of(equations: Equations, items: list[Item], status: Status) -> EquilibriumBranch:
+    """The branch through points and bifurcations in order."""
+    spots = [each for each in items if isinstance(each, Spot)]
+    own = [eigenvalues_of(equations.within(each.u)) for each in spots]
+    stable = [is_stable(each) for each in own]
+    beside = dict(zip(map(id, spots), stable, strict=True))
+    found = [
+        _bifurcation(equations, *item, _sides(items, i, beside))
+        for i, item in enumerate(items)
+        if not isinstance(item, Spot)
+    ]
+    return EquilibriumBranch(
+        system=equations.system,
+        name=equations.names[0],
+        mode=equations.mode,
+        parameter=np.array([each.u[-1] for each in spots]),
+        x=np.array([equations.state(each.u) for each in spots]),
+        eigenvalues=np.array(own),
+        stable=np.array(stable),
+        admissible=np.array([not equations.excluded_by(each.u, each.units) for each in spots]),
+        bifurcations=tuple(found),
+        status=status,
+        equations=equations,
+    )
+
+
+def _sides(items: list[Item], i: int, stable: dict[int, bool]) -> tuple[bool | None, bool | None]:
+    """Whether the equilibria before and after an item are stable; None at an end of the branch."""
+    before, after = (
+        next((stable[id(each)] for each in part if isinstance(each, Spot)), None)
+        for part in (items[:i][::-1], items[i + 1 :])
+    )
+    return before, after
+
+
+def _bifurcation(
+    equations: Equations,
+    kind: str,
+    spot: Spot,
+    barrier: Barrier | None,
+    stable: tuple[bool | None, bool | None],
+) -> EquilibriumBifurcation:
+    """A bifurcation as a result."""
+    assert isinstance(spot.system, Reduced)
+    name, u = equations.names[0], spot.u
+    coefficient, period, modes = None, None, tuple[str, ...]()
+    if kind == "fold":
+        coefficient, side = fold_at(spot.system, u)
+        message = f"two equilibria meet and vanish; they are on the side of {_side(side)} {name}"
+    elif kind == "Hopf":
+        hopf = hopf_at(equations, u, spot.units * spot.tangent)
+        coefficient, period = hopf.first, 2.0 * np.pi / hopf.omega
+        others = np.sort(eigenvalues_of(equations.within(u)).real)[:-2]
+        attract = hopf.first < 0.0 and np.all(others < 0.0)
+        word = "supercritical" if hopf.first < 0.0 else "subcritical"
+        message = (
+            f"{word}: {'stable' if attract else 'unstable'} cycles of period {period:.6g} begin, on the side "
+            f"of {_side(hopf.side)} {name}"
+        )
+    elif barrier is not None:
+        others_there = neighbours(equations, u, spot.units)
+        modes = tuple(each.equations.mode for each in others_there if each.side)
+        message = told(neighbour_of(equations, u, spot.units), others_there, barrier, name)
+    else:
+        message = "another branch of equilibria crosses"
+    return EquilibriumBifurcation(
+        kind, name, float(u[-1]), described(equations, u), message, stable, coefficient, period, modes, spot
+    )
+
+
+def _side(value: float) -> str:
+    return "larger" if value > 0.0 else "smaller"
+
+
+def _status(why: list[str]) -> Status:
+    text = " and at ".join(ENDS[each] for each in dict.fromkeys(why))
+    if not {"lost", "most"} & set(why):
+        return attrs.evolve(SUCCESS, message=f"The branch ends at {text}.")
+    return Status(
+        StatusCode.NOT_CONVERGED,
+        f"The branch ends at {text}.",
+        "Raise max_steps, or continue from the last equilibrium.",
+    )

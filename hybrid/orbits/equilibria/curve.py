@@ -1,0 +1,197 @@
+"""Curves of solutions of ``N`` equations in ``N + 1`` unknowns: Newton's method, pseudo-arclength steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Protocol
+
+import attrs
+import numpy as np
+
+# Corrections stop at this size, in units of the unknowns, and fail if they have not come to the second one.
+SMALL, LOOSE = 1e-14, 1e-10
+MOST_CORRECTIONS = 12
+# A step may turn by this angle (its cosine).
+LEAST_COSINE = 0.95
+# Lengths of steps, in units of the unknowns and of the range of the parameter.
+FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 0.01, 0.05, 1e-9
+FEW_CORRECTIONS, LONGER = 4, 1.5
+# A state that is larger than the first one by this factor grows without bound.
+UNBOUNDED = 2.0**26
+
+
+class System(Protocol):
+    """``N`` equations in ``N + 1`` unknowns."""
+
+    def residual(self, u: np.ndarray) -> np.ndarray:
+        """Values ``(N,)``."""
+        ...
+
+    def jacobian(self, u: np.ndarray) -> np.ndarray:
+        """Derivatives ``(N, N + 1)``."""
+        ...
+
+
+@attrs.frozen(eq=False)
+class Spot:
+    """A point of a curve.
+
+    Attributes
+    ----------
+    system
+        The equations of the curve.
+    u, units
+        The unknowns ``(N + 1,)`` and their units.
+    tangent
+        The direction of the curve ``(N + 1,)``, of length 1, in these units.
+    """
+
+    system: System
+    u: np.ndarray
+    units: np.ndarray
+    tangent: np.ndarray
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """The derivatives in the unknowns in their units, each row of length 1, and the tangent below."""
+        return np.vstack([_rows(self.system, self.u, self.units)[0], self.tangent])
+
+    def step(self, length: float) -> tuple[Spot, int] | None:
+        """The point at a distance along the tangent, and how many corrections it took; or None."""
+        made = corrected(self.system, self.u + length * self.units * self.tangent, self.units, self.tangent)
+        if made is None:
+            return None
+        found = spot_at(self.system, made[0], self.units, self.tangent)
+        if found is None or found.tangent @ self.tangent < LEAST_COSINE:
+            return None
+        return found, made[1]
+
+    def distance(self, other: Spot) -> float:
+        """How far another point is along the tangent."""
+        return float(self.tangent @ ((other.u - self.u) / self.units))
+
+
+def corrected(
+    system: System, guess: np.ndarray, units: np.ndarray, normal: np.ndarray
+) -> tuple[np.ndarray, int] | None:
+    """The solution near a guess in the plane across ``normal``, and how many corrections it took; or None."""
+    u, before = guess, np.inf
+    for count in range(1, MOST_CORRECTIONS + 1):
+        rows, values = _rows(system, u, units)
+        values = np.append(values, normal @ ((u - guess) / units))
+        try:
+            step = np.linalg.solve(np.vstack([rows, normal]), -values)
+        except np.linalg.LinAlgError:
+            return None
+        size = float(np.abs(step).max())
+        if not np.isfinite(size):
+            return None
+        if size > 0.5 * before:
+            # No nearer: rounding, or no solution.
+            return (u, count) if before <= LOOSE else None
+        u, before = u + units * step, size
+        if size <= SMALL:
+            return u, count
+    return (u, count) if before <= LOOSE else None
+
+
+def spot_at(system: System, u: np.ndarray, units: np.ndarray, onward: np.ndarray) -> Spot | None:
+    """The point of a curve, with the tangent that is nearest to a direction; None if it has no derivative."""
+    rows, _ = _rows(system, u, units)
+    if not np.isfinite(rows).all():
+        return None
+    _, values, vectors = np.linalg.svd(rows)
+    # Where curves cross there are more directions.
+    null = vectors[min(int(np.sum(values > LOOSE * values[0])), len(vectors) - 1) :]
+    along = null.T @ (null @ onward)
+    length = float(np.linalg.norm(along))
+    return None if length == 0.0 else Spot(system, u, units, along / length)
+
+
+def _rows(system: System, u: np.ndarray, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The derivatives in the unknowns in their units, each row of length 1, and the values with them."""
+    rows = system.jacobian(u) * units
+    lengths = np.linalg.norm(rows, axis=1)
+    lengths[lengths == 0.0] = 1.0
+    return rows / lengths[:, None], system.residual(u) / lengths
+
+
+def zero_between(spot: Spot, after: Spot, function: Callable[[Spot], float]) -> Spot | None:
+    """The point between two where a function changes its sign; None if it is not found."""
+    from scipy.optimize import brentq
+
+    known = {0.0: spot, spot.distance(after): after}
+
+    def value(length: float) -> float:
+        if length not in known:
+            made = spot.step(length)
+            if made is None:
+                raise ArithmeticError
+            known[length] = made[0]
+        return function(known[length])
+
+    try:
+        root = brentq(value, *known, xtol=1e-15, rtol=4e-16 * 4, maxiter=80, disp=False)
+    except (ArithmeticError, ValueError):
+        return None
+    return known[min(known, key=lambda each: abs(each - root))]
+
+
+def at_value(spot: Spot, place: int, value: float) -> Spot | None:
+    """The point beside one at which an unknown has a value."""
+    guess = spot.u.copy()
+    guess[place] = value
+    made = corrected(spot.system, guess, spot.units, np.eye(len(guess))[place])
+    return None if made is None else spot_at(spot.system, made[0], spot.units, spot.tangent)
+
+
+def walk(
+    spot: Spot, place: int, low: float, high: float, most: int, renewed: Callable[[Spot], Spot]
+) -> Iterator[Spot | str]:
+    """Points along a curve until the unknown at a place leaves a range; the last item is why it ends.
+
+    Each step begins at the point before it as ``renewed`` gives it, in units that have grown with it.
+    """
+    length, start, sizes = FIRST_STEP, spot, np.abs(spot.u) + spot.units
+    for number in range(most):
+        made = spot.step(length)
+        while made is None:
+            length /= 2.0
+            if length < SHORTEST_STEP:
+                yield "lost"
+                return
+            made = spot.step(length)
+        after, corrections = made
+        if not low <= after.u[place] <= high:
+            last = _at_the_edge(spot, after, place, low if after.u[place] < low else high)
+            if last is not None:
+                yield last
+            yield "range"
+            return
+        if number > 1 and _passes(start, spot, after):
+            yield start
+            yield "closed"
+            return
+        yield after
+        if np.any(np.abs(after.u) > UNBOUNDED * sizes):
+            yield "infinity"
+            return
+        if corrections <= FEW_CORRECTIONS:
+            length = min(LONGEST_STEP, LONGER * length)
+        spot = renewed(after)
+    yield "most"
+
+
+def _at_the_edge(spot: Spot, after: Spot, place: int, edge: float) -> Spot | None:
+    """The point between two at which an unknown has the value of the edge."""
+    last = zero_between(spot, after, lambda each: float(each.u[place]) - edge)
+    return at_value(last or spot, place, edge)
+
+
+def _passes(start: Spot, spot: Spot, after: Spot) -> bool:
+    """Whether a step passes the first point, in its direction."""
+    reach, share = spot.distance(after), spot.distance(start)
+    if not 0.0 < share <= reach or start.tangent @ spot.tangent < LEAST_COSINE:
+        return False
+    made = spot.step(share)
+    return made is not None and bool(np.all(np.abs(made[0].u - start.u) <= LOOSE * start.units * 1e2))
