@@ -24,6 +24,7 @@ from hybrid.orbits.continuation.saved import open_branch
 from hybrid.orbits.continuation.switch_branch import switch_branch
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation, EquilibriumBranch
 from hybrid.orbits.equilibria.continue_equilibrium import continue_equilibrium
+from hybrid.orbits.equilibria.curves import EquilibriumCurve, SpecialEquilibrium
 from hybrid.orbits.equilibria.equilibrium import Equilibrium, equilibrium
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.periodic_orbit import periodic_orbit
@@ -69,6 +70,7 @@ __all__ = [
     "Equilibrium",
     "EquilibriumBifurcation",
     "EquilibriumBranch",
+    "EquilibriumCurve",
     "Every",
     "GlobalError",
     "Grazing",
@@ -85,6 +87,7 @@ __all__ = [
     "Reset",
     "Section",
     "Solver",
+    "SpecialEquilibrium",
     "Status",
     "StatusCode",
     "Table",

@@ -21,6 +21,8 @@ from hybrid.orbits.continuation.place import Place, place_of, place_on
 from hybrid.orbits.continuation.result import Points, orbit_of, whole_orbit_of
 from hybrid.orbits.continuation.route import Loop
 from hybrid.orbits.continuation.watch import OfArc, Unmeasured, Watch, checked_outputs, units_of
+from hybrid.orbits.equilibria.branch import EquilibriumBifurcation
+from hybrid.orbits.equilibria.curves import EquilibriumCurve, curve_of
 from hybrid.orbits.orbit import PeriodicOrbit, unaged
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names, attributes
@@ -182,29 +184,30 @@ class BifurcationCurve:
 
 
 def continue_bifurcation(
-    bifurcation: Bifurcation,
+    bifurcation: Bifurcation | EquilibriumBifurcation,
     over: Mapping[str, tuple[float, float]],
     *,
     outputs: Mapping[str, OfArc] | None = None,
     solver: Solver | None = None,
     max_steps: int = 500,
     progress: bool | None = None,
-) -> BifurcationCurve:
+) -> BifurcationCurve | EquilibriumCurve:
     """The curve of a bifurcation over two parameters, both ways from where it was found.
 
     The orbits of two parameters form a surface. The curve is where the test function of the bifurcation is
     zero on it: of a fold, a flip or a torus the same as in :func:`hybrid.continue_orbit`, and where the
-    transitions change the height, speed, time or comparison of a condition that vanishes there.
+    transitions change the height, speed, time or comparison of a condition that vanishes there. Of
+    equilibria a fold, a Hopf point and a boundary are followed by regular equations of their own.
 
     Parameters
     ----------
     bifurcation
-        Of a `Branch`: any kind but a branch point, which two parameters do not keep, and zeros of functions
-        in ``events=``.
+        Of a `Branch` or an `EquilibriumBranch`: any kind but a branch point, which two parameters do not
+        keep, and zeros of functions in ``events=``.
     over
         Names of two parameters with their ranges: ``{"omega": (6.5, 8.5), "P": (300.0, 700.0)}``.
     outputs
-        Functions of an arc, by name, as of :func:`hybrid.continue_orbit`.
+        Functions of an arc, by name, as of :func:`hybrid.continue_orbit`; not for equilibria.
     solver
         Method and tolerances, by default ``Taylor(rtol=1e-12, atol=1e-14)``.
     max_steps
@@ -214,7 +217,7 @@ def continue_bifurcation(
 
     Returns
     -------
-    BifurcationCurve
+    BifurcationCurve or EquilibriumCurve
         With a status; if it is interrupted or lost it keeps what there is.
 
     Raises
@@ -239,10 +242,16 @@ def continue_bifurcation(
     >>> curve.status.ok
     True
     """
-    arguments.instance("bifurcation", bifurcation, Bifurcation, "Take one of branch.bifurcations.")
-    names, lows, highs = _ranges(bifurcation, over)
+    if not isinstance(bifurcation, EquilibriumBifurcation):
+        arguments.instance("bifurcation", bifurcation, Bifurcation, "Take one of branch.bifurcations.")
+    there = bifurcation.equilibrium if isinstance(bifurcation, EquilibriumBifurcation) else bifurcation.orbit
+    names, lows, highs = _ranges(there.parameters, over)
     most = arguments.count("max_steps", max_steps, 1)
     progress = None if progress is None else arguments.flag("progress", progress)
+    if isinstance(bifurcation, EquilibriumBifurcation):
+        if outputs is not None:
+            raise arguments.refusal("outputs", "be left out: an equilibrium has no arc", outputs)
+        return curve_of(bifurcation, names, lows, highs, most, progress)
     method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
     measured = checked_outputs(outputs, bifurcation.orbit.system)
     watch = Watch(method, Points(bifurcation.orbit.t0), measured)
@@ -269,13 +278,12 @@ class _Found:
     failures: list[str] = attrs.field(factory=list)
 
 
-def _ranges(bifurcation: Bifurcation, over: object) -> tuple[tuple[str, str], np.ndarray, np.ndarray]:
+def _ranges(parameters: Mapping[str, float], over: object) -> tuple[tuple[str, str], np.ndarray, np.ndarray]:
     """Names of the parameters, and the ends of their ranges."""
     wanted = "map the names of two parameters to their ranges, as in {'omega': (6.5, 8.5), 'P': (300, 700)}"
     if not isinstance(over, Mapping) or len(over) != 2:
         raise arguments.refusal("over", wanted, over)
     lows, highs = np.empty(2), np.empty(2)
-    parameters = bifurcation.orbit.parameters
     for j, (name, span) in enumerate(over.items()):
         arguments.known("over: Parameter", name, parameters, "Parameters")
         ends = arguments.numbers(f"over[{name!r}]", span, "be (low, high)")

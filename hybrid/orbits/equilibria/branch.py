@@ -44,8 +44,8 @@ class EquilibriumBifurcation:
         of length 1 (Kuznetsov, sections 5.4 and 3.3). None for other kinds.
     period
         Of a Hopf point the period of the smallest cycles; else None.
-    modes
-        Of a boundary the other modes that have an equilibrium there.
+    modes, barrier
+        Of a boundary the other modes that have an equilibrium there, and the transition whose guard it is.
     """
 
     kind: str
@@ -57,6 +57,7 @@ class EquilibriumBifurcation:
     coefficient: float | None = None
     period: float | None = None
     modes: tuple[str, ...] = ()
+    barrier: str = ""
     _place: Any = attrs.field(default=None, repr=False)
 
     def __str__(self) -> str:

@@ -125,7 +125,8 @@ def continue_equilibrium(
     return _branch_of(equations, items, status)
 
 
-Item = Spot | tuple[str, Spot, Barrier | None]
+Found = tuple[str, Spot, Barrier | None]
+Item = Spot | Found
 
 
 def _both_ways(
@@ -139,7 +140,8 @@ def _both_ways(
         items = items[::-1]
         spot = before = attrs.evolve(begin, tangent=sign * begin.tangent)
         with CTRL_C.ending():
-            for item in walk(spot, equations.n, low, high, most, partial(_renewed, equations)):
+            ends = np.array([low]), np.array([high])
+            for item in walk(spot, *ends, most, partial(_renewed, equations)):
                 if isinstance(item, str):
                     why.append(item)
                     break
@@ -196,7 +198,7 @@ def _renewed(equations: Equations, spot: Spot) -> Spot:
 
 def _between(equations: Equations, spot: Spot, after: Spot) -> list[Item]:
     """The bifurcations between two points, in order."""
-    found: list[tuple[str, Spot, Barrier | None]] = []
+    found: list[Found] = []
     changed = [kind for kind, function in TESTS.items() if _changes(function, spot, after)]
     if "branch point" in changed and "fold" in changed:
         # A branch that crosses another one at its turn, as the arms of a pitchfork do.
@@ -209,10 +211,10 @@ def _between(equations: Equations, spot: Spot, after: Spot) -> list[Item]:
         there = _met(equations, barrier, spot, after)
         if there is not None:
             found.append(("boundary", there, barrier))
-    return sorted(_each_once(found), key=lambda item: spot.distance(item[1]))
+    return [*sorted(_each_once(found), key=lambda each: spot.distance(each[1]))]
 
 
-def _each_once(found: list[tuple[str, Spot, Barrier | None]]) -> Iterator[tuple[str, Spot, Barrier | None]]:
+def _each_once(found: list[Found]) -> Iterator[Found]:
     """Boundaries at one point, of several guards on one surface, as the first of them."""
     met: list[Spot] = []
     for kind, spot, barrier in found:
@@ -239,9 +241,14 @@ def _branch_point(spot: Spot) -> float:
 
 
 def _hopf(spot: Spot) -> float:
-    """Zero where two eigenvalues have the sum zero: the product of all sums of two, each by its size."""
+    """Zero where two eigenvalues have the sum zero."""
     assert isinstance(spot.system, Reduced)
-    own = eigenvalues_of(spot.system.equations.within(spot.u))
+    return pair_sums(spot.system.equations, spot.u)
+
+
+def pair_sums(equations: Equations, u: np.ndarray) -> float:
+    """The product of the sums of two eigenvalues, each by its size; 1 if there is only one eigenvalue."""
+    own = eigenvalues_of(equations.within(u))
     product = 1.0 + 0.0j
     for one, other in combinations(own, 2):
         size = abs(one) + abs(other)
@@ -330,7 +337,7 @@ def _bifurcation(
     """A bifurcation as a result."""
     assert isinstance(spot.system, Reduced)
     name, u = equations.names[0], spot.u
-    coefficient, period, modes = None, None, tuple[str, ...]()
+    coefficient, period, modes, guard = None, None, tuple[str, ...](), ""
     if kind == "fold":
         coefficient, side = fold_at(spot.system, u)
         message = f"two equilibria meet and vanish; they are on the side of {_side(side)} {name}"
@@ -346,12 +353,22 @@ def _bifurcation(
         )
     elif barrier is not None:
         others_there = neighbours(equations, u, spot.units)
-        modes = tuple(each.equations.mode for each in others_there if each.side)
+        modes, guard = tuple(each.equations.mode for each in others_there if each.side), barrier.names[0]
         message = told(neighbour_of(equations, u, spot.units), others_there, barrier, name)
     else:
         message = "another branch of equilibria crosses"
     return EquilibriumBifurcation(
-        kind, name, float(u[-1]), described(equations, u), message, stable, coefficient, period, modes, spot
+        kind=kind,
+        parameter=name,
+        value=float(u[-1]),
+        equilibrium=described(equations, u),
+        message=message,
+        stable=stable,
+        coefficient=coefficient,
+        period=period,
+        modes=modes,
+        barrier=guard,
+        place=spot,
     )
 
 

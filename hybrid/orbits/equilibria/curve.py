@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Protocol
 
 import attrs
@@ -146,9 +147,9 @@ def at_value(spot: Spot, place: int, value: float) -> Spot | None:
 
 
 def walk(
-    spot: Spot, place: int, low: float, high: float, most: int, renewed: Callable[[Spot], Spot]
+    spot: Spot, lows: np.ndarray, highs: np.ndarray, most: int, renewed: Callable[[Spot], Spot]
 ) -> Iterator[Spot | str]:
-    """Points along a curve until the unknown at a place leaves a range; the last item is why it ends.
+    """Points along a curve until one of the last unknowns leaves its range; the last item is why it ends.
 
     Each step begins at the point before it as ``renewed`` gives it, in units that have grown with it.
     """
@@ -162,8 +163,9 @@ def walk(
                 return
             made = spot.step(length)
         after, corrections = made
-        if not low <= after.u[place] <= high:
-            last = _at_the_edge(spot, after, place, low if after.u[place] < low else high)
+        values = after.u[-len(lows) :]
+        if np.any(values < lows) or np.any(values > highs):
+            last = _at_the_edge(spot, after, lows, highs)
             if last is not None:
                 yield last
             yield "range"
@@ -182,10 +184,19 @@ def walk(
     yield "most"
 
 
-def _at_the_edge(spot: Spot, after: Spot, place: int, edge: float) -> Spot | None:
-    """The point between two at which an unknown has the value of the edge."""
-    last = zero_between(spot, after, lambda each: float(each.u[place]) - edge)
-    return at_value(last or spot, place, edge)
+def _at_the_edge(spot: Spot, after: Spot, lows: np.ndarray, highs: np.ndarray) -> Spot | None:
+    """The point between two at which the first of the last unknowns leaves its range."""
+    found = []
+    for i, (low, high) in enumerate(zip(lows, highs, strict=True), start=-len(lows)):
+        if not low <= after.u[i] <= high:
+            edge = low if after.u[i] < low else high
+            last = zero_between(spot, after, partial(_over, i, edge))
+            found.append(at_value(last or spot, i, edge))
+    return min((each for each in found if each is not None), key=spot.distance, default=None)
+
+
+def _over(i: int, edge: float, spot: Spot) -> float:
+    return float(spot.u[i]) - edge
 
 
 def _passes(start: Spot, spot: Spot, after: Spot) -> bool:

@@ -46,35 +46,40 @@ def critical_pair(matrix: np.ndarray) -> complex:
 
 
 def hopf_at(equations: Equations, u: np.ndarray, onward: np.ndarray) -> Hopf:
-    """The normal form of a Hopf bifurcation at a point of a branch in the direction ``onward (n + 1,)``.
+    """The normal form of a Hopf bifurcation at a point of a branch in the direction ``onward (n + 1,)``."""
+    omega, q, p = eigenvectors(equations, u)
+    along = equations.rates.second(equations.known(u), np.append(q, 0.0), onward / onward[-1])
+    return Hopf(omega, q, lyapunov_at(equations, u, 1), float((p.conj() @ along).real))
+
+
+def lyapunov_at(equations: Equations, u: np.ndarray, count: int) -> float:
+    """The first Lyapunov coefficient at a point with ``count`` parameters among its unknowns.
 
     For the formula see Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, section 5.4. The eigenvector
     has length 1, and so has its product with the adjoint one.
     """
     n, known, matrix = equations.n, equations.known(u), equations.matrix(u)
-    omega, q, p = _pair(matrix, critical_pair(equations.within(u)))
-
-    def whole(vector: np.ndarray) -> np.ndarray:
-        return np.append(vector, 0.0)
+    omega, q, p = eigenvectors(equations, u)
+    still = np.zeros(count)
 
     def bent(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-        return equations.rates.second(known, whole(one), whole(other))
+        return equations.rates.second(known, np.append(one, still), np.append(other, still))
 
     # On a surface that the mode stays on, the mean displacement stays on it.
     normals = equations.surfaces.jacobian(known)[:, :n]
-    curved = equations.surfaces.second(known, whole(q), whole(q.conj()))
+    curved = equations.surfaces.second(known, np.append(q, still), np.append(q.conj(), still))
     mean = np.linalg.lstsq(
         np.vstack([matrix, normals]), -np.concatenate([bent(q, q.conj()), curved]), rcond=None
     )[0]
     double = np.linalg.solve(2j * omega * np.eye(n) - matrix, bent(q, q))
-    third = equations.rates.third(known, whole(q), whole(q), whole(q.conj()))
-    sum_of_all = p.conj() @ (third + 2.0 * bent(q, mean) + bent(q.conj(), double))
-    growth = p.conj() @ equations.rates.second(known, whole(q), onward / onward[-1])
-    return Hopf(omega, q, float(sum_of_all.real) / (2.0 * omega), float(growth.real))
+    third = equations.rates.third(known, *(np.append(each, still) for each in (q, q, q.conj())))
+    total = p.conj() @ (third + 2.0 * bent(q, mean) + bent(q.conj(), double))
+    return float(total.real) / (2.0 * omega)
 
 
-def _pair(matrix: np.ndarray, value: complex) -> tuple[float, np.ndarray, np.ndarray]:
-    """The frequency of an eigenvalue of a matrix, its eigenvector and the adjoint one."""
+def eigenvectors(equations: Equations, u: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """The frequency of the pair nearest to the imaginary axis, its eigenvector and the adjoint one."""
+    matrix, value = equations.matrix(u), critical_pair(equations.within(u))
     values, vectors = np.linalg.eig(matrix)
     q = vectors[:, np.argmin(np.abs(values - value))]
     values, vectors = np.linalg.eig(matrix.T)
@@ -86,14 +91,29 @@ def _pair(matrix: np.ndarray, value: complex) -> tuple[float, np.ndarray, np.nda
 def fold_at(part: Reduced, u: np.ndarray) -> tuple[float, float]:
     """The coefficient ``a = p.B(q, q) / 2`` of a fold, and the side of the parameter on which equilibria are.
 
-    The null vectors ``q`` and ``p`` have length 1 and product 1, as in Kuznetsov, section 5.4.
+    The null vectors ``q`` and ``p`` have length 1 and product 1, as in Kuznetsov, section 3.3.
     """
+    bent, product, _ = fold_forms(part, u, 1)
     rows = part.jacobian(u)
-    left, _, right = np.linalg.svd(rows[:, :-1])
+    p = np.linalg.svd(rows[:, :-1])[0][:, -1]
+    return 0.5 * bent / product, -bent / float(p @ rows[:, -1])
+
+
+def fold_forms(
+    part: Reduced, u: np.ndarray, count: int, like: np.ndarray | None = None
+) -> tuple[float, float, float]:
+    """``p.B(q, q)`` and ``p.q`` for null vectors of length 1, and the size of the terms of the first.
+
+    There are ``count`` parameters among the unknowns. The vector ``q`` points as ``like (n,)`` does.
+    """
+    left, _, right = np.linalg.svd(part.jacobian(u)[:, :-count])
     q, p = right[-1], left[:, -1]
-    bent = p @ part.second_along(u, np.append(q, 0.0)) @ np.append(q, 0.0)
-    product = float(p @ np.concatenate([part.basis.T @ q, np.zeros(len(p) - part.basis.shape[1])]))
-    return 0.5 * float(bent) / product, -float(bent) / float(p @ rows[:, -1])
+    if like is not None and q @ like < 0.0:
+        q = -q
+    whole = np.append(q, np.zeros(count))
+    bends = part.second_along(u, whole)
+    within = np.concatenate([part.basis.T @ q, np.zeros(len(p) - part.basis.shape[1])])
+    return float(p @ bends @ whole), float(p @ within), float(np.abs(p) @ np.abs(bends) @ np.abs(whole))
 
 
 def branch_point_near(part: Reduced, u: np.ndarray, units: np.ndarray) -> np.ndarray | None:
