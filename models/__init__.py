@@ -17,6 +17,7 @@ from models.impact_oscillator import impact_oscillator
 from models.impact_pair import impact_pair
 from models.infusion_schedule import infusion_schedule
 from models.refractory_neuron import refractory_neuron
+from models.relief_valve import relief_valve
 from models.rimless_wheel import rimless_wheel
 from models.rocking_block import rocking_block
 from models.sampled_loop import sampled_loop
@@ -47,6 +48,7 @@ __all__ = [
     "impact_pair",
     "infusion_schedule",
     "refractory_neuron",
+    "relief_valve",
     "rimless_wheel",
     "rocking_block",
     "sampled_loop",

@@ -16,7 +16,7 @@ from hybrid.errors import ArgumentError
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation
 from hybrid.orbits.equilibria.continue_equilibrium import pair_sums
 from hybrid.orbits.equilibria.curve import Spot, spot_at, walk, zero_between
-from hybrid.orbits.equilibria.defining import Boundary, Defining, Fold, HopfPoint, defining_of, state_of
+from hybrid.orbits.equilibria.defining import BoundaryPoint, Defining, FoldPoint, HopfPoint, defining_of, state_of
 from hybrid.orbits.equilibria.equations import Equations, Reduced, reduced
 from hybrid.orbits.equilibria.equilibrium import Equilibrium, described, eigenvalues_of
 from hybrid.orbits.equilibria.normal_forms import eigenvectors, fold_forms, lyapunov_at
@@ -183,12 +183,12 @@ def _begun(bifurcation: EquilibriumBifurcation, equations: Equations, reach: np.
     part = reduced(equations, u)
     system: Defining
     if bifurcation.kind == "fold":
-        system = Fold(part)
+        system = FoldPoint(part)
     elif bifurcation.kind == "Hopf":
         system = HopfPoint(part, eigenvectors(equations, u)[1])
     else:
         barrier = next(each for each in equations.barriers if bifurcation.barrier in each.names)
-        system = Boundary(part, barrier)
+        system = BoundaryPoint(part, barrier)
     units = np.concatenate([bifurcation._place.units[:-1], reach])
     extra, sizes = system.extra(u, units)
     whole, units = np.concatenate([extra, u]), np.concatenate([sizes, units])
@@ -284,9 +284,9 @@ def _pairs(spot: Spot) -> float:
 
 
 TESTS: dict[type, dict[str, Callable[[Spot], float]]] = {
-    Fold: {"cusp": _fold_forms},
+    FoldPoint: {"cusp": _fold_forms},
     HopfPoint: {"frequency": _frequency, "generalized Hopf": _lyapunov, "zero-Hopf": _determinant},
-    Boundary: {"boundary-fold": _determinant, "boundary-Hopf": _pairs},
+    BoundaryPoint: {"boundary-fold": _determinant, "boundary-Hopf": _pairs},
 }
 
 

@@ -11,7 +11,7 @@ from hybrid.orbits.equilibria.normal_forms import critical_pair
 
 
 @attrs.frozen(eq=False)
-class Boundary:
+class BoundaryPoint:
     """An equilibrium on a guard; the unknowns are the state and the two parameters ``(n + 2,)``."""
 
     part: Reduced
@@ -29,13 +29,13 @@ class Boundary:
         """The unknowns before the state at a point, none, and their units."""
         return np.empty(0), np.empty(0)
 
-    def renewed(self, part: Reduced, whole: np.ndarray) -> Boundary:
+    def renewed(self, part: Reduced, whole: np.ndarray) -> BoundaryPoint:
         """The equations at another point."""
-        return Boundary(part, self.barrier)
+        return BoundaryPoint(part, self.barrier)
 
 
 @attrs.frozen(eq=False)
-class Fold:
+class FoldPoint:
     """An eigenvalue zero: before the state comes its eigenvector ``v``, of length 1."""
 
     part: Reduced
@@ -65,9 +65,9 @@ class Fold:
         v = np.linalg.svd(self.part.jacobian(u)[:, :-2])[2][-1]
         return v, _units_of(v, units)
 
-    def renewed(self, part: Reduced, whole: np.ndarray) -> Fold:
+    def renewed(self, part: Reduced, whole: np.ndarray) -> FoldPoint:
         """The equations at another point."""
-        return Fold(part)
+        return FoldPoint(part)
 
 
 @attrs.frozen(eq=False)
@@ -129,7 +129,7 @@ class HopfPoint:
         return whole[:n], whole[n : 2 * n], float(whole[2 * n]), whole[2 * n + 1 :]
 
 
-Defining = Boundary | Fold | HopfPoint
+Defining = BoundaryPoint | FoldPoint | HopfPoint
 
 
 def _units_of(vector: np.ndarray, units: np.ndarray) -> np.ndarray:
@@ -140,7 +140,7 @@ def _units_of(vector: np.ndarray, units: np.ndarray) -> np.ndarray:
 
 def defining_of(spot: Spot) -> Defining:
     """The defining equations that a point of a curve solves."""
-    assert isinstance(spot.system, Boundary | Fold | HopfPoint)
+    assert isinstance(spot.system, BoundaryPoint | FoldPoint | HopfPoint)
     return spot.system
 
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 import hybrid
 import models
@@ -12,7 +11,6 @@ from hybrid import (
     Guard,
     HybridSystem,
     Mode,
-    Reset,
     Transition,
     continue_equilibrium,
     continue_orbit,
@@ -315,44 +313,3 @@ def test_a_closed_branch_comes_back_to_its_start():
     assert "closed" in branch.status.message
     assert sorted(round(each.value, 10) for each in branch.of("fold")) == [-1.0, 1.0]
     np.testing.assert_allclose(branch.parameter**2 + branch["x"] ** 2, 1.0, atol=1e-12)
-
-
-def test_the_hopf_point_of_a_relief_valve():
-    """The condition of Routh and Hurwitz for the cubic of the valve, solved by a bracket."""
-    kappa, beta, delta = 1.25, 20.0, 10.0
-    valve = HybridSystem(
-        state=("y", "v", "pressure"),
-        parameters={"q": 9.0},
-        modes=[
-            Mode(
-                "open",
-                lambda t, x, p: (
-                    x.v,
-                    -kappa * x.v - (x.y + delta) + x.pressure,
-                    beta * (p.q - x.y * np.sqrt(x.pressure)),
-                ),
-            )
-        ],
-        transitions=[
-            Transition(
-                "open",
-                "open",
-                Guard(lambda t, x, p: x.y, -1),
-                Reset(lambda t, x, p: {"y": 0.0, "v": -0.8 * x.v}),
-            )
-        ],
-    )
-
-    def flow(lift):
-        return lift * np.sqrt(lift + delta)
-
-    def condition(lift):
-        root = np.sqrt(lift + delta)
-        leak = beta * lift / (2 * root)
-        return (kappa + leak) * (1 + kappa * leak) - (leak + beta * root)
-
-    exact = flow(brentq(condition, 0.01, 5.0, xtol=1e-15))
-    branch = continue_equilibrium(equilibrium(valve, (2.5, 0.0, 12.5)), "q", (0.5, 9.0))
-    [hopf] = branch.of("Hopf")
-    assert abs(hopf.value - exact) < 1e-10
-    assert branch.admissible.all()
