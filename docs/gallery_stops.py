@@ -8,7 +8,15 @@ import numpy as np
 from matplotlib.axes import Axes
 
 import models
-from hybrid import DOP853, continue_orbit, periodic_orbit, simulate, stroboscopic_section
+from hybrid import (
+    DOP853,
+    continue_equilibrium,
+    continue_orbit,
+    equilibrium,
+    periodic_orbit,
+    simulate,
+    stroboscopic_section,
+)
 from hybrid.measures import amplitude
 from hybrid.plot import COLOURS, plot_branch, plot_phase
 
@@ -43,6 +51,26 @@ def bouncing_table(ax: Axes) -> None:
         ax.plot(np.full(len(speeds), acceleration), speeds, **DOTS)
     ax.set_xlabel("acceleration of the table $A w^2 / g$")
     ax.set_ylabel("impact speed (m/s)")
+
+
+def relief_valve(ax: Axes) -> None:
+    system = models.relief_valve()
+    branch = continue_equilibrium(equilibrium(system, (2.5, 0.0, 12.5)), "q", (0.5, 10.0))
+    for stable, style in ((True, "-"), (False, "--")):
+        ax.plot(
+            branch.parameter, np.where(branch.stable == stable, branch["y"], np.nan), style, color=COLOURS[1]
+        )
+    [hopf] = branch.of("Hopf")
+    ax.plot(hopf.value, hopf.equilibrium["y"], "o", color=COLOURS[1])
+    for q in np.linspace(0.5, 10.0, 200):
+        arc = simulate(
+            system, (2.5, 0.3, 12.5), (0.0, 200.0), mode="open", parameters={"q": q}, solver=COARSE
+        )
+        late = arc(np.linspace(150.0, 200.0, 5001), "y")
+        tops = late[1:-1][(late[1:-1] > late[:-2]) & (late[1:-1] >= late[2:])]
+        ax.plot(np.full(len(tops), q), tops, **DOTS)
+    ax.set_xlabel("inflow $q$")
+    ax.set_ylabel("lift $y$ at its maxima")
 
 
 def impact_pair(ax: Axes) -> None:
@@ -152,6 +180,12 @@ PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
         "gear_pair",
         "Resonance of gears with backlash: orbits, and runs up and down in the frequency.",
         gear_pair,
+    ),
+    (
+        "relief_valve",
+        "Lift of a relief valve over the inflow: the equilibrium, stable to the Hopf point, and the tops of "
+        "simulated motions, which flutter and hit the seat.",
+        relief_valve,
     ),
     (
         "rocking_block",

@@ -60,6 +60,8 @@ DEFAULTS = {
         **{"solver": None, "max_steps": 2000, "progress": None},
     },
     hybrid.continue_bifurcation: {"outputs": None, "solver": None, "max_steps": 500, "progress": None},
+    hybrid.equilibrium: {"mode": None, "parameters": None, "max_iterations": 60},
+    hybrid.continue_equilibrium: {"max_steps": 2000, "progress": None},
     hybrid.open_branch: {},
     hybrid.open_end: {},
     hybrid.filippov: {"start": None, **SYSTEM},
@@ -168,6 +170,7 @@ def test_every_public_call_is_listed():
     listed = {each.__name__ for each in DEFAULTS} | {"work_precision"}
     # Bases, errors and results are made by the library.
     made = {"Bifurcation", "BifurcationCurve", "Branch", "CodimensionTwo", "HybridArc", "Solver"}
+    made |= {"EquilibriumBifurcation"}
     made |= {"Attractor", "Attractors", "Status", "StatusCode", "TwoOrbitExponents"}
     for package in (hybrid, lyapunov):
         for name in package.__all__:

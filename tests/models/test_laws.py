@@ -96,6 +96,14 @@ RUNS = {
         models.refractory_neuron(),
         {"states": {"u": (-70.0, -55.0)}, "t_span": (0.0, 60.0)},
     ),
+    "relief_valve": (
+        models.relief_valve(),
+        {
+            "states": {"y": (0.1, 4.0), "v": (-3.0, 3.0), "P": (4.0, 9.9)},
+            "parameters": {"q": (0.2, 9.0), "r": (0.05, 0.8)},
+            "t_span": (0.0, 4.0),
+        },
+    ),
     "rimless_wheel": (
         models.rimless_wheel(),
         {"states": {"theta": (-0.25, 0.35), "omega": (-2.0, 2.0)}, "t_span": (0.0, 2.0)},

@@ -46,6 +46,15 @@ class EquilibriumBifurcation:
         Of a Hopf point the period of the smallest cycles; else None.
     modes, barrier
         Of a boundary the other modes that have an equilibrium there, and the transition whose guard it is.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> rest = hybrid.equilibrium(models.relief_valve(), (2.5, 0.0, 12.5))
+    >>> branch = hybrid.continue_equilibrium(rest, "q", (1.0, 10.0))
+    >>> [hopf] = branch.bifurcations
+    >>> hopf.kind, round(hopf.value, 6), round(hopf.period, 6)
+    ('Hopf', 8.491118, 2.032927)
     """
 
     kind: str
@@ -89,6 +98,14 @@ class EquilibriumBranch(Asked):
         Each :class:`hybrid.EquilibriumBifurcation`, in order along the branch.
     status
         Why the branch ends where it does.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> rest = hybrid.equilibrium(models.relief_valve(), (2.5, 0.0, 12.5))
+    >>> branch = hybrid.continue_equilibrium(rest, "q", (1.0, 10.0))
+    >>> bool(branch.stable[branch.parameter > 8.5].all()), bool(branch.stable[branch.parameter < 8.4].any())
+    (True, False)
     """
 
     system: HybridSystem

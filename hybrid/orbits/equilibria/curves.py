@@ -16,7 +16,14 @@ from hybrid.errors import ArgumentError
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation
 from hybrid.orbits.equilibria.continue_equilibrium import pair_sums
 from hybrid.orbits.equilibria.curve import Spot, spot_at, walk, zero_between
-from hybrid.orbits.equilibria.defining import BoundaryPoint, Defining, FoldPoint, HopfPoint, defining_of, state_of
+from hybrid.orbits.equilibria.defining import (
+    BoundaryPoint,
+    Defining,
+    FoldPoint,
+    HopfPoint,
+    defining_of,
+    state_of,
+)
 from hybrid.orbits.equilibria.equations import Equations, Reduced, reduced
 from hybrid.orbits.equilibria.equilibrium import Equilibrium, described, eigenvalues_of
 from hybrid.orbits.equilibria.normal_forms import eigenvectors, fold_forms, lyapunov_at
@@ -59,6 +66,19 @@ class SpecialEquilibrium:
         The two parameters by name.
     equilibrium, message
         The equilibrium there, and what happens, in words.
+
+    Examples
+    --------
+    >>> import hybrid
+    >>> cubic = hybrid.HybridSystem(
+    ...     state=("x",),
+    ...     parameters={"a": -2.0, "b": 1.0},
+    ...     modes=[hybrid.Mode("flow", lambda t, x, p: (p.a + p.b * x.x - x.x**3,))],
+    ... )
+    >>> fold = hybrid.continue_equilibrium(hybrid.equilibrium(cubic, (-1.5,)), "a", (-2.0, 2.0)).of("fold")[0]
+    >>> [cusp] = hybrid.continue_bifurcation(fold, {"a": (-2.0, 2.0), "b": (-1.0, 2.0)}).points
+    >>> cusp.kind, abs(cusp.values["b"]) < 1e-10
+    ('cusp', True)
     """
 
     kind: str
@@ -92,6 +112,16 @@ class EquilibriumCurve:
         Each :class:`hybrid.SpecialEquilibrium` on the curve, in order.
     status
         Why the curve ends where it does.
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> rest = hybrid.equilibrium(models.relief_valve(), (2.5, 0.0, 12.5))
+    >>> branch = hybrid.continue_equilibrium(rest, "q", (1.0, 10.0))
+    >>> curve = hybrid.continue_bifurcation(branch.of("Hopf")[0], {"q": (1.0, 20.0), "kappa": (1.0, 1.5)})
+    >>> [bautin] = curve.points
+    >>> bautin.kind, {name: round(value, 4) for name, value in bautin.values.items()}
+    ('generalized Hopf', {'q': 9.6103, 'kappa': 1.0731})
     """
 
     system: HybridSystem
