@@ -39,6 +39,12 @@ from hybrid.status import Status, StatusCode
 from hybrid.sweep.attractors.attractor import Attractor, Attractors
 from hybrid.sweep.attractors.attractors import attractors
 from hybrid.sweep.attractors.basins import basins
+from hybrid.sweep.attractors.boundaries import (
+    BasinEntropy,
+    UncertaintyExponent,
+    basin_entropy,
+    uncertainty_exponent,
+)
 from hybrid.sweep.attractors.fractions import basin_fractions
 from hybrid.sweep.many import simulate_many
 from hybrid.sweep.store import open_store
@@ -62,6 +68,7 @@ __all__ = [
     "At",
     "Attractor",
     "Attractors",
+    "BasinEntropy",
     "Bifurcation",
     "BifurcationCurve",
     "Branch",
@@ -94,8 +101,10 @@ __all__ = [
     "Taylor",
     "Transition",
     "Tsit5",
+    "UncertaintyExponent",
     "WorkPrecision",
     "attractors",
+    "basin_entropy",
     "basin_fractions",
     "basins",
     "compile_system",
@@ -118,6 +127,7 @@ __all__ = [
     "stroboscopic_section",
     "sweep",
     "switch_branch",
+    "uncertainty_exponent",
     "work_precision",
 ]
 

@@ -110,6 +110,8 @@ DEFAULTS = {
     },
     hybrid.attractors: {**SEARCH, **SAMPLE, "starts": 500, "executor": None},
     hybrid.basins: {**SEARCH, "store": None, "executor": None},
+    hybrid.basin_entropy: {"size": 5},
+    hybrid.uncertainty_exponent: {"sizes": None},
     hybrid.basin_fractions: {
         **{**SEARCH, **SAMPLE, "along": None, "starts": 1000, "store": None, "executor": None},
     },
