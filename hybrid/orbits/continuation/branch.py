@@ -32,7 +32,7 @@ class Bifurcation:
     ----------
     kind
         Smooth ones: ``"fold"``, ``"flip"`` (period doubling), ``"torus"`` (Neimark-Sacker),
-        ``"branch point"``.
+        ``"branch point"``, ``"Hopf"`` (the orbits of an autonomous system shrink to an equilibrium).
         Where the sequence of transitions changes: ``"grazing"`` (a guard is touched without speed),
         ``"corner"`` (two guards are met at one point, or the condition of a guard changes where it is
         reached), ``"border"`` (the same, and the orbit is in some mode on one side alone),
@@ -52,7 +52,7 @@ class Bifurcation:
         size; of a flip the same for the orbits of twice the period, whose halves differ by ``2 s``.
         Of a grazing with a jump of finite size, the vector ``C (n,)`` of the zero-time discontinuity map: an
         orbit that would go beyond the guard by ``H`` is moved by ``C sqrt(H)`` where it would be farthest
-        (Nordmark 1991). None for other kinds.
+        (Nordmark 1991). Of a Hopf point the first Lyapunov coefficient. None for other kinds.
     position
         How many orbits of the branch come before it.
     outputs

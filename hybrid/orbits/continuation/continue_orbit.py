@@ -15,6 +15,7 @@ from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
 from hybrid.orbits.continuation.crossing import crossing, flip_coefficient, fold_coefficient, is_supercritical
 from hybrid.orbits.continuation.event import KINDS, Event
+from hybrid.orbits.continuation.hopf import first_lyapunov
 from hybrid.orbits.continuation.monitors import Monitors
 from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import Place, moment, place_on, share_of
@@ -406,6 +407,8 @@ def _normal_form(event: Event) -> tuple[np.ndarray | float | None, str]:
     if event.kind == "fold":
         found = fold_coefficient(place)
         return found, "" if found is None else f"; the orbits are on the side of {_side(found)} {name}"
+    if event.kind == "Hopf":
+        return first_lyapunov(place), ""
     begins = event.kind == "flip" and np.abs(place.orbit.free_multipliers + 1.0).min() < AT_MINUS_ONE
     doubled = crossing(place, 2) if begins else None
     if doubled is None:

@@ -12,6 +12,7 @@ KINDS = (
     "fold",
     "flip",
     "torus",
+    "Hopf",
     "branch point",
     "grazing",
     "corner",

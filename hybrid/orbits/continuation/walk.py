@@ -8,6 +8,7 @@ import numpy as np
 
 from hybrid.orbits.continuation.change import Change, located
 from hybrid.orbits.continuation.event import Event
+from hybrid.orbits.continuation.hopf import hopf_end
 from hybrid.orbits.continuation.instants import SAME, halves, passes_by
 from hybrid.orbits.continuation.monitors import Monitors
 from hybrid.orbits.continuation.place import (
@@ -73,6 +74,10 @@ def walk(
             return
         last = after if change is None else change.place
         if last.orbit.is_point or _turned(place, last):
+            end = hopf_end(place)
+            if end is not None and low <= end.value <= high:
+                yield Event("Hopf", end, "the orbits shrink to an equilibrium: this branch begins here")
+                yield end
             yield "equilibrium"
             return
         if _comes_to_its_half(place, last):

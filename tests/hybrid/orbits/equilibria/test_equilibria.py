@@ -225,6 +225,11 @@ def test_small_cycles_begin_at_a_hopf_point():
     branch = continue_orbit(cycle, "B", (1.5, 2.2))
     assert branch.stable.all()
     assert "a point" in branch.status.message
+    [end] = branch.of("Hopf")
+    assert abs(end.value - 2.0) < 1e-10
+    assert abs(end.orbit.period - hopf.period) < 1e-10
+    assert end.coefficient == pytest.approx(hopf.coefficient)
+    assert min(branch.parameter) == end.value
 
 
 @pytest.mark.parametrize("units", [(1.0, 1.0), (1e-6, 1e4)], ids=["plain", "other units"])
