@@ -12,6 +12,8 @@ from typing import Any
 from hybrid import arguments
 from hybrid.orbits.continuation.branch import Branch
 from hybrid.orbits.continuation.continue_bifurcation import BifurcationCurve
+from hybrid.orbits.equilibria.branch import EquilibriumBranch
+from hybrid.orbits.equilibria.curves import EquilibriumCurve
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.sections import Section
 from hybrid.plot.arcs import plot_arc, plot_phase
@@ -90,6 +92,8 @@ def drawn(result: Any, **options: Any) -> Any:
 
 drawn.register(HybridArc, plot_arc)
 drawn.register(Branch, plot_branch)
+drawn.register(EquilibriumBranch, plot_branch)
+drawn.register(EquilibriumCurve, plot_curve)
 drawn.register(list, plot_branch)
 drawn.register(tuple, plot_branch)
 drawn.register(BifurcationCurve, plot_curve)

@@ -1,4 +1,4 @@
-"""Branches of orbits over a parameter, and curves of bifurcations over two."""
+"""Branches of orbits and of equilibria over a parameter, and curves of bifurcations over two."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from hybrid.display.tables import with_unit
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Branch
 from hybrid.orbits.continuation.continue_bifurcation import BifurcationCurve
+from hybrid.orbits.equilibria.branch import EquilibriumBranch
+from hybrid.orbits.equilibria.curves import EquilibriumCurve
 from hybrid.orbits.labelled import table_at
 from hybrid.plot.datasets import SECTION, column
 from hybrid.plot.style import COLOURS, axes_for, dot_area, named_quantity, small_legend
@@ -21,6 +23,8 @@ from hybrid.simulation.labelled import Names
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
+
+AnyBranch = Branch | EquilibriumBranch
 
 # Markers by kind of bifurcation, and those of zeros of functions that callers name.
 MARKERS = {
@@ -35,12 +39,16 @@ MARKERS = {
     "grazing-sliding": "p",
     "switching-sliding": "h",
     "adding-sliding": "d",
+    "Hopf": "*",
+    "boundary": "8",
 }
-OTHERS = ("X", "*", "H", "8", "P")
+OTHERS = ("X", "H", "1", "2", "3", "4")
 LINES = {"stable": "-", "unstable": "--"}
 # Line width in points, the smallest area of a dot that is seen beside such a line, and the colour of what
 # stands for all branches.
 LINE = 1.4
+# Opacity of equilibria that lie where their mode does not hold.
+VIRTUAL = 0.35
 SEEN = 2.6
 NEUTRAL = "0.2"
 # Marks the first line of each branch, so that the next one has the next colour.
@@ -48,7 +56,7 @@ OF_BRANCH = "branch"
 
 
 def plot_branch(
-    branch: Branch | Sequence[Branch],
+    branch: AnyBranch | Sequence[AnyBranch],
     y: str | int = 0,
     *,
     over: xarray.Dataset | Axes | None = None,
@@ -59,12 +67,13 @@ def plot_branch(
     """Draw what a branch is asked for by name over its parameter, with the bifurcations.
 
     Stable parts are full, unstable ones dashed, and each kind of bifurcation has its marker; the legend says
-    so. Each further branch in the same axes has a colour of its own.
+    so. Virtual equilibria are pale. Each further branch in the same axes has a colour of its own.
 
     Parameters
     ----------
     branch
-        From :func:`hybrid.continue_orbit`, or several over one parameter.
+        From :func:`hybrid.continue_orbit` or :func:`hybrid.continue_equilibrium`, or several over one
+        parameter.
     y
         Name or index of a component or name of an output at the orbits' points, or name of a function in
         ``outputs=`` of :func:`hybrid.continue_orbit`; by default the first component.
@@ -119,27 +128,39 @@ def plot_branch(
         _draw_branch(ax, each, name, text)
     known = Names(branches[0].system.state_names, branches[0].system.units)
     ax.set_xlabel(known.label(branches[0].name))
-    unit = branches[0].output_units.get(names[0])
-    ax.set_ylabel(with_unit(names[0], unit) if names[0] in branches[0].outputs else known.label(names[0]))
+    ax.set_ylabel(_label_of(branches[0], names[0]))
     _legend(ax)
     return ax
 
 
-def _branches_of(given: object) -> list[Branch]:
+def _label_of(branch: AnyBranch, name: str) -> str:
+    """The name of what is drawn, with its unit."""
+    if isinstance(branch, Branch) and name in branch.outputs:
+        return with_unit(name, branch.output_units.get(name))
+    return Names(branch.system.state_names, branch.system.units).label(name)
+
+
+def _branches_of(given: object) -> list[AnyBranch]:
     """One branch or several, over one parameter."""
-    hint = "Make one with hybrid.continue_orbit."
     if not isinstance(given, list | tuple):
-        return [arguments.instance("branch", given, Branch, hint)]
+        return [_branch_of("branch", given)]
     if not given:
         raise arguments.refusal("branch", "be a branch, or several", given)
-    found = [arguments.instance(f"branch[{i}]", each, Branch, hint) for i, each in enumerate(given)]
+    found = [_branch_of(f"branch[{i}]", each) for i, each in enumerate(given)]
     over = list(dict.fromkeys(each.name for each in found))
     if len(over) > 1:
         raise ArgumentError(f"branch: all must be over one parameter to be drawn; got {', '.join(over)}.")
     return found
 
 
-def _labels_of(given: object, branches: Sequence[Branch]) -> list[str | None]:
+def _branch_of(name: str, given: object) -> AnyBranch:
+    if isinstance(given, EquilibriumBranch):
+        return given
+    hint = "Make one with hybrid.continue_orbit or hybrid.continue_equilibrium."
+    return arguments.instance(name, given, Branch, hint)
+
+
+def _labels_of(given: object, branches: Sequence[AnyBranch]) -> list[str | None]:
     """What the legend says of each branch."""
     if given is None:
         return [None] * len(branches)
@@ -149,58 +170,69 @@ def _labels_of(given: object, branches: Sequence[Branch]) -> list[str | None]:
     return found
 
 
-def _quantity_of(branch: Branch, y: object) -> str:
+def _quantity_of(branch: AnyBranch, y: object) -> str:
     """The name of what a branch is asked for."""
-    if arguments.whole_number(y) is None:
+    if isinstance(branch, Branch) and arguments.whole_number(y) is None:
         return branch._asked("y: ", y)
     return named_quantity("y", branch.system, y)
 
 
-def _draw_branch(ax: Axes, branch: Branch, name: str, label: str | None) -> None:
+def _draw_branch(ax: Axes, branch: AnyBranch, name: str, label: str | None) -> None:
     """Lines of a branch in the next colour, its bifurcations, and what a legend needs."""
     colour = COLOURS[sum(each.get_gid() == OF_BRANCH for each in ax.lines) % len(COLOURS)]
     if label is not None:
         ax.plot([], [], "-", color=colour, lw=LINE, label=label)
-    across, values, stable = _with_bifurcations(branch, name)
+    across, values, stable, admissible = _with_bifurcations(branch, name)
     first = True
-    for is_stable, part in groupby(range(len(stable)), key=lambda k: bool(stable[k])):
+    kinds = [*zip(stable.tolist(), admissible.tolist(), strict=True)]
+    for (is_stable, is_admissible), part in groupby(range(len(kinds)), key=kinds.__getitem__):
         inside = list(part)
         # The line reaches to the next part.
         shown = [*inside, *([inside[-1] + 1] if inside[-1] + 1 < len(stable) else [])]
         text, style = [*LINES.items()][0 if is_stable else 1]
-        (line,) = ax.plot(across[shown], values[shown], style, color=colour, lw=LINE)
+        opacity = 1.0 if is_admissible else VIRTUAL
+        (line,) = ax.plot(across[shown], values[shown], style, color=colour, lw=LINE, alpha=opacity)
         line.set_gid(OF_BRANCH if first else None)
         first = False
         if text not in _texts(ax):
             ax.plot([], [], style, color=NEUTRAL, lw=LINE, label=text)
-    found = branch.bifurcations
+    found: list[Any] = [*branch.bifurcations]
     there = _there(branch, name)
     _mark(ax, [(each.kind, each.value, up) for each, up in zip(found, there, strict=True)])
 
 
-def _there(branch: Branch, name: str) -> np.ndarray:
+def _there(branch: AnyBranch, name: str) -> np.ndarray:
     """What a branch is asked for, at its bifurcations."""
+    if isinstance(branch, EquilibriumBranch):
+        return np.array([each.equilibrium[name][0] for each in branch.bifurcations])
     found = branch.bifurcations
     if name in branch.outputs:
         return np.array([each.outputs[name] for each in found])
     return table_at(branch.system, [name], [each.orbit for each in found])[:, 0]
 
 
-def _with_bifurcations(branch: Branch, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Parameter, values and stability along a branch, with the bifurcations among its orbits."""
+def _with_bifurcations(branch: AnyBranch, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Parameter, values, stability and admissibility along a branch, its bifurcations among them."""
     there = _there(branch, name)
-    shown = [(each, up) for each, up in zip(branch.bifurcations, there, strict=True) if np.isfinite(up)]
+    found: list[Any] = [*branch.bifurcations]
+    shown = [(each, up) for each, up in zip(found, there, strict=True) if np.isfinite(up)]
     at = [each.position for each, _ in shown]
     stable = [each.stable[1] if each.stable[1] is not None else bool(each.stable[0]) for each, _ in shown]
+    admissible = np.ones(len(branch), dtype=bool)
+    if isinstance(branch, EquilibriumBranch):
+        admissible = branch.admissible
+    # A bifurcation belongs to what comes after it.
+    onward = [bool(admissible[min(i, len(branch) - 1)]) for i in at]
     return (
         np.insert(branch.parameter, at, [each.value for each, _ in shown]),
         np.insert(branch[name], at, [up for _, up in shown]),
         np.insert(branch.stable, at, stable),
+        np.insert(admissible, at, onward),
     )
 
 
 def plot_curve(
-    curve: BifurcationCurve,
+    curve: BifurcationCurve | EquilibriumCurve,
     *,
     ax: Axes | None = None,
     figsize: tuple[float, float] | None = None,
@@ -230,7 +262,8 @@ def plot_curve(
     >>> ax.get_xlabel(), ax.get_ylabel()
     ('w', 'r')
     """
-    arguments.instance("curve", curve, BifurcationCurve, "Make one with hybrid.continue_bifurcation.")
+    if not isinstance(curve, EquilibriumCurve):
+        arguments.instance("curve", curve, BifurcationCurve, "Make one with hybrid.continue_bifurcation.")
     (ax,) = axes_for(ax, 1, (5.4, 4.2), figsize)
     first, second = curve.names
     ax.plot(curve[first], curve[second], lw=1.4, label=curve.kind)

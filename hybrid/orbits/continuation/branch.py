@@ -15,6 +15,7 @@ from hybrid.orbits.continuation.change import Change
 from hybrid.orbits.continuation.event import KINDS
 from hybrid.orbits.continuation.labelled import dataset_of
 from hybrid.orbits.continuation.place import Place
+from hybrid.orbits.kinds import of_kinds
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.simulation.quantities import Asked, mode_indices, quantity, table_of
 from hybrid.status import Status
@@ -176,13 +177,7 @@ class Branch(Asked):
         ArgumentError
             If there is no such kind.
         """
-        wanted = "be a kind of bifurcation, or several of them"
-        names = [kinds] if isinstance(kinds, str) else arguments.items("kinds", kinds, wanted, least=1)
-        there = ", ".join(dict.fromkeys(each.kind for each in self.bifurcations)) or "none"
-        allowed = (*KINDS, *self.events)
-        for name in names:
-            arguments.known("kinds: Kind", name, allowed, f"On this branch: {there}. Kinds")
-        return tuple(each for each in self.bifurcations if each.kind in names)
+        return of_kinds(self.bifurcations, kinds, (*KINDS, *self.events))
 
     @cached_property
     def orbits(self) -> tuple[PeriodicOrbit, ...]:

@@ -12,6 +12,7 @@ from hybrid import arguments
 from hybrid.display.tables import counted
 from hybrid.orbits.equilibria.equations import Equations
 from hybrid.orbits.equilibria.equilibrium import Equilibrium, described
+from hybrid.orbits.kinds import of_kinds
 from hybrid.simulation.labelled import Names, attributes, with_outputs
 from hybrid.simulation.quantities import Asked, table_of
 from hybrid.status import Status
@@ -44,6 +45,8 @@ class EquilibriumBifurcation:
         of length 1 (Kuznetsov, sections 5.4 and 3.3). None for other kinds.
     period
         Of a Hopf point the period of the smallest cycles; else None.
+    position
+        How many points of the branch come before it.
     modes, barrier
         Of a boundary the other modes that have an equilibrium there, and the transition whose guard it is.
 
@@ -65,6 +68,7 @@ class EquilibriumBifurcation:
     stable: tuple[bool | None, bool | None]
     coefficient: float | None = None
     period: float | None = None
+    position: int = 0
     modes: tuple[str, ...] = ()
     barrier: str = ""
     _place: Any = attrs.field(default=None, repr=False)
@@ -131,16 +135,15 @@ class EquilibriumBranch(Asked):
         i = arguments.index("i", i, len(self))
         return described(self._equations, np.append(self.x[i, : self._equations.n], self.parameter[i]))
 
-    def of(self, kind: str) -> tuple[EquilibriumBifurcation, ...]:
-        """The bifurcations of a kind, in order.
+    def of(self, kinds: str | Iterable[str]) -> tuple[EquilibriumBifurcation, ...]:
+        """The bifurcations of one kind or of several, in order along the branch.
 
         Raises
         ------
         ArgumentError
             If there is no such kind.
         """
-        arguments.known("kind: Kind", kind, KINDS, "Kinds")
-        return tuple(each for each in self.bifurcations if each.kind == kind)
+        return of_kinds(self.bifurcations, kinds, KINDS)
 
     def __len__(self) -> int:
         return len(self.parameter)

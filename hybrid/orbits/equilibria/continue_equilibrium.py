@@ -299,7 +299,9 @@ def _branch_of(equations: Equations, items: list[Item], status: Status) -> Equil
     stable = [is_stable(each) for each in own]
     beside = dict(zip(map(id, spots), stable, strict=True))
     found = [
-        _bifurcation(equations, *item, _sides(items, i, beside))
+        _bifurcation(
+            equations, *item, _sides(items, i, beside), sum(isinstance(each, Spot) for each in items[:i])
+        )
         for i, item in enumerate(items)
         if not isinstance(item, Spot)
     ]
@@ -333,6 +335,7 @@ def _bifurcation(
     spot: Spot,
     barrier: Barrier | None,
     stable: tuple[bool | None, bool | None],
+    position: int,
 ) -> EquilibriumBifurcation:
     """A bifurcation as a result."""
     assert isinstance(spot.system, Reduced)
@@ -366,6 +369,7 @@ def _bifurcation(
         stable=stable,
         coefficient=coefficient,
         period=period,
+        position=position,
         modes=modes,
         barrier=guard,
         place=spot,

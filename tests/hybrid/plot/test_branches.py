@@ -9,6 +9,7 @@ mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 
+import hybrid
 import models
 from hybrid import ArgumentError, HybridSystem, Mode, continue_orbit, periodic_orbit, sweep
 from hybrid.measures import amplitude, maximum, minimum
@@ -160,3 +161,38 @@ def test_refused_datasets_and_lists(branches):
     along = continue_orbit(branches[0].orbit(0), "r", (0.79, 0.81), outputs=OUTPUTS)
     with pytest.raises(ArgumentError, match="branch: all must be over one parameter to be drawn; got w, r"):
         plot([branches[0], along])
+
+
+def test_equilibria_and_their_cycles_in_one_picture():
+    """Full, dashed and pale lines of equilibria, then the cycles that begin at the Hopf point."""
+    valve = models.relief_valve()
+    rest = hybrid.continue_equilibrium(hybrid.equilibrium(valve, (2.5, 0.0, 12.5)), "q", (8.0, 9.0))
+    ax = hybrid.plot(rest, y="y")
+    texts = ax.get_legend_handles_labels()[1]
+    assert {"stable", "unstable", "Hopf"} <= {*texts}
+    cycle = hybrid.switch_branch(rest.of("Hopf")[0])
+    cycles = hybrid.continue_orbit(cycle, "q", (8.3, 9.0), outputs={"top": maximum("y")})
+    hybrid.plot(cycles, y="top", ax=ax)
+    colours = {line.get_color() for line in ax.lines if line.get_gid() == "branch"}
+    assert len(colours) == 2
+    assert cycles["top"][-1] == pytest.approx(rest.of("Hopf")[0].equilibrium["y"][0])
+
+
+def test_virtual_equilibria_are_pale():
+    block = hybrid.HybridSystem(
+        state=("q",),
+        parameters={"F": -1.0},
+        modes=[
+            hybrid.Mode("free", lambda t, x, p: (p.F - x.q,)),
+            hybrid.Mode("stop", lambda t, x, p: (p.F - 9 * x.q,)),
+        ],
+        transitions=[
+            hybrid.Transition("free", "stop", hybrid.Guard(lambda t, x, p: x.q, +1)),
+            hybrid.Transition("stop", "free", hybrid.Guard(lambda t, x, p: x.q, -1)),
+        ],
+    )
+    branch = hybrid.continue_equilibrium(hybrid.equilibrium(block, (-0.5,)), "F", (-1.0, 1.0))
+    ax = hybrid.plot(branch)
+    pale = [line for line in ax.lines if line.get_alpha() is not None and line.get_alpha() < 1.0]
+    assert len(pale) == 1
+    assert min(pale[0].get_xdata()) == pytest.approx(0.0)
