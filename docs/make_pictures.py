@@ -15,7 +15,18 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import models
-from hybrid import DOP853, HybridSystem, continue_orbit, periodic_orbit, simulate, stroboscopic_section
+from hybrid import (
+    DOP853,
+    HybridSystem,
+    continue_equilibrium,
+    continue_orbit,
+    equilibrium,
+    periodic_orbit,
+    simulate,
+    stroboscopic_section,
+    switch_branch,
+)
+from hybrid.measures import maximum
 from hybrid.plot import COLOURS, plot_arc, plot_branch, plot_graph, plot_phase
 from lyapunov import chart
 from lyapunov.plot import plot_chart, style
@@ -126,6 +137,19 @@ def branch_picture(folder: Path) -> None:
     save(draw(diagram(models.vibroimpact(), points=201, intervals=400)), folder / "regimes_diagram.png")
 
 
+def equilibria_picture(folder: Path) -> None:
+    """Equilibria of the relief valve, and the cycles that begin at their Hopf point."""
+    rest = equilibrium(models.relief_valve(), (2.5, 0.0, 12.5))
+    branch = continue_equilibrium(rest, "q", (0.5, 10.0))
+    axes = plot_branch(branch, "y", label="equilibrium", figsize=(6.4, 3.4))
+    cycle = switch_branch(branch.of("Hopf")[0])
+    cycles = continue_orbit(cycle, "q", (4.0, 10.0), outputs={"top": maximum("y")})
+    plot_branch(cycles, "top", label="cycles", ax=axes)
+    axes.set_xlabel("inflow q")
+    axes.set_ylabel("largest lift")
+    save(axes.figure, folder / "equilibria.png")
+
+
 def save(figure: Any, path: Path) -> None:
     figure.savefig(path, metadata={"Software": None})
     plt.close(figure)
@@ -155,6 +179,7 @@ def main() -> None:
         outputs_picture(model_of(OUTPUTS, "ball"), folder)
         chart_picture(system, folder)
         branch_picture(folder)
+        equilibria_picture(folder)
 
 
 if __name__ == "__main__":
