@@ -101,10 +101,15 @@ def spot_at(system: System, u: np.ndarray, units: np.ndarray, onward: np.ndarray
     rows, _ = _rows(system, u, units)
     if not np.isfinite(rows).all():
         return None
-    _, values, vectors = np.linalg.svd(rows)
-    # Where curves cross there are more directions.
-    null = vectors[min(int(np.sum(values > LOOSE * values[0])), len(vectors) - 1) :]
-    along = null.T @ (null @ onward)
+    try:
+        along = np.linalg.solve(np.vstack([rows, onward]), np.eye(len(u))[-1])
+    except np.linalg.LinAlgError:
+        along = np.full(len(u), np.inf)
+    if not np.linalg.norm(along) * np.linalg.norm(onward) < 1.0 / LEAST_COSINE**8:
+        # The direction has turned by much, or curves cross, where there are more directions.
+        _, values, vectors = np.linalg.svd(rows)
+        null = vectors[min(int(np.sum(values > LOOSE * values[0])), len(vectors) - 1) :]
+        along = null.T @ (null @ onward)
     length = float(np.linalg.norm(along))
     return None if length == 0.0 else Spot(system, u, units, along / length)
 
