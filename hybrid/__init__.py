@@ -50,6 +50,7 @@ from hybrid.sweep.many import simulate_many
 from hybrid.sweep.store import open_store
 from hybrid.sweep.sweep import sweep
 from hybrid.system.clocks import After, Every
+from hybrid.system.delay import Delay
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.system.laws import Laws
@@ -74,6 +75,7 @@ __all__ = [
     "Branch",
     "CodimensionTwo",
     "CompiledSystem",
+    "Delay",
     "Equilibrium",
     "EquilibriumBifurcation",
     "EquilibriumBranch",

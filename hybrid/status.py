@@ -49,6 +49,7 @@ class StatusCode(IntEnum):
     ROUNDED_TIME = 108
     OUT_OF_MEMORY = 109
     START_BEYOND = 110
+    DELAY_FULL = 111
 
 
 @attrs.frozen
@@ -206,6 +207,19 @@ def stuck_status(where: str, transitions: Sequence[Transition], facing: bool) ->
         f"{message} Each jump takes the state beyond the guard of the next.",
         "Change the resets so that one of them leaves the state before the next guard, or give a guard a "
         "condition (when=).",
+    )
+
+
+def full_status(where: str, name: str, places: int, told: str) -> Status:
+    """Status of a run in which more is under way than the delay of a transition has places for.
+
+    ``told`` says in few words when the transition fires.
+    """
+    return Status(
+        StatusCode.DELAY_FULL,
+        f"The delay of transition {name!r}, {told}, has {places} places, and one more would be under way "
+        f"{where}.",
+        "Raise places= of the Delay.",
     )
 
 

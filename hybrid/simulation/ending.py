@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import attrs
@@ -19,6 +20,7 @@ from hybrid.status import (
     beyond_status,
     chatter_status,
     discontinuous_status,
+    full_status,
     late_status,
     run_status,
     steep_status,
@@ -175,6 +177,9 @@ def _status(trajectory: Trajectory, code: int) -> Status:
         fired = _recent(trajectory, run.round)
         derived = all(_is_derived(trajectory, i) for i in fired)
         return chatter_status(where, [names[i] for i in fired], derived=derived)
+    full = _full(trajectory) if code == codes.NON_FINITE else None
+    if full is not None:
+        return full
     last = run.last_fired
     if code in (codes.STEP_TOO_SMALL, codes.NON_FINITE):
         failed = _failed(trajectory, code)
@@ -223,6 +228,19 @@ def _failed(trajectory: Trajectory, code: int) -> Status | None:
         "If the field is smooth, RadauIIA() takes longer steps. If it is not, as a quotient is where its "
         "denominator vanishes, add a transition to a mode in which the state rests.",
     )
+
+
+def _full(trajectory: Trajectory) -> Status | None:
+    """Status of a run that ended as a delay had no place left; None if it ended for another reason."""
+    system, x = trajectory.system, trajectory.x
+    view, p = system.variables.state_view(x), system.variables.parameter_view(trajectory.parameters)
+    for transition in system.transitions:
+        clock = transition.clock
+        if clock is not None and clock.number == codes.UNDER_WAY:
+            *places, last = numbers_of(clock, view, p)
+            if float(last) == math.inf:
+                return full_status(_place(trajectory), transition.name, len(places), clock.told)
+    return None
 
 
 def _clock_fault(trajectory: Trajectory) -> Status | None:

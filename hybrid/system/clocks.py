@@ -134,6 +134,8 @@ class Clock(Portable):
     restarts: ClassVar[bool] = True
     # The component of the state that is the time since the entry of the mode, if there is one.
     age: ClassVar[int | None] = None
+    # The places of the numbers that resets may change, where they do not follow from what the author wrote.
+    moving: ClassVar[tuple[int, ...] | None] = None
 
     # The clock as a guard.
     function: Callable[..., Any] = attrs.field(
@@ -151,6 +153,11 @@ class Clock(Portable):
 
     # The table whose columns the reset reads, if there is one.
     schedule: ClassVar[Any] = None
+
+    @property
+    def kind(self) -> str:
+        """What its author wrote, by name."""
+        return type(self).__name__
 
     @property
     def when(self) -> Callable[..., Any] | None:
@@ -350,7 +357,12 @@ class DerivedClock(Clock):
     read: Callable[[Any, Any], Sequence[Any]]
     when: Callable[..., Any] | None
     age: int | None = None  # type: ignore[misc]
-    moving: tuple[int, ...] = ()
+    moving: tuple[int, ...] = ()  # type: ignore[misc]
+
+    @property
+    def kind(self) -> str:
+        """That of the original."""
+        return self.clock.kind
 
     @property
     def number(self) -> int:  # type: ignore[override]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from html import escape
 from textwrap import fill
 from typing import Any
@@ -31,9 +32,8 @@ def described_in_html(system: Any) -> str:
 
 def _heading(system: Any) -> list[str]:
     units = system.units
-    told = [with_unit(name, units.get(name)) for name in system.state_names]
-    moving, tangent = system.variables.moving, system.tangent_dimension
-    state = ", ".join(told[:moving])
+    variables = system.variables
+    state = _listed(system, variables.state_names[: variables.moving])
     if isinstance(system.state, int) and not any(name in units for name in system.state_names):
         state = f"{system.state} components"
     parameters = ", ".join(
@@ -45,10 +45,12 @@ def _heading(system: Any) -> list[str]:
         f"parameters: {parameters or 'none'}",
         f"modes: {', '.join(map(repr, system.mode_names))}",
     ]
-    if system.counters:
-        lines.insert(2, f"counters: {', '.join(told[tangent:])}")
-    if system.held:
-        lines.insert(2, f"held: {', '.join(told[moving:tangent])}")
+    if system.under_way:
+        waits = [repr(each.name) for each in system.transitions if each.clock and each.clock.kind == "Delay"]
+        lines.insert(2, f"under way: {len(system.under_way)} components, for {', '.join(waits)}")
+    for kind in ("counters", "held"):
+        listed = _listed(system, getattr(system, kind))
+        lines[2:2] = [f"{kind}: {listed}"] if listed else []
     if "t" in units:
         lines.insert(2, f"time: {with_unit('t', units['t'])}")
     if system.outputs:
@@ -69,6 +71,12 @@ def _heading(system: Any) -> list[str]:
     if not system.is_whole:
         lines.append("A run adds the modes that it needs.")
     return lines
+
+
+def _listed(system: Any, names: Iterable[str]) -> str:
+    """Those of the names that an author gave, with their units."""
+    own = (name for name in names if name not in system.under_way)
+    return ", ".join(with_unit(name, system.units.get(name)) for name in own)
 
 
 def _period_told(system: Any) -> str:

@@ -176,7 +176,7 @@ def _as_guard(value: Any) -> Guard | Clock:
         return value
     raise ModelError(
         f"Transition: guard must be a Guard or a clock; got {shown(value)}. Write Guard(function, "
-        "direction=...), Every(period), At(times) or After(duration)."
+        "direction=...), Every(period), At(times), After(duration) or Delay(trigger, duration)."
     )
 
 
@@ -201,7 +201,7 @@ class Transition(Portable):
         Names of modes. If the target is ``None``, the run ends where the transition fires, with the status
         ``TERMINAL``.
     guard
-        When the transition fires: a `Guard`, or a clock, one of `Every`, `At` and `After`.
+        When the transition fires: a `Guard`, or a clock, one of `Every`, `At`, `After` and `Delay`.
     reset
         Map of the state at the jump; ``None`` is the identity.
     accumulates_to

@@ -6,13 +6,14 @@ import numpy as np
 
 from hybrid.errors import ModelError
 from hybrid.system.clocks import Clock
+from hybrid.system.delayed import marks_alone
 from hybrid.system.elements import Transition
 from hybrid.system.graph import HybridSystem
 
 
 def enters_anew(system: HybridSystem, transition: Transition) -> bool:
     """Whether a transition enters its target anew: not if it marks, or leads to another part of its mode."""
-    if transition.target is None or transition.is_marker:
+    if transition.target is None or transition.is_marker or marks_alone(transition):
         return False
     source, target = map(system.mode_index, (transition.source, transition.target))
     whole, other = system.modes[source].part_of, system.modes[target].part_of

@@ -24,6 +24,11 @@ def as_transitions(value: Iterable[Transition]) -> tuple[Transition, ...]:
     return tuple(arguments.items("HybridSystem: transitions", value, "be a list of Transition objects"))
 
 
+def as_under_way(value: Any) -> tuple[str, ...]:
+    """Names of components as a tuple."""
+    return tuple(arguments.items("HybridSystem: under_way", value, "be left out: a Delay gives it"))
+
+
 def as_listed_order(value: object) -> bool:
     """True or False."""
     return arguments.flag("HybridSystem: listed_order", value)

@@ -13,6 +13,7 @@ import numpy as np
 from hybrid import arguments
 from hybrid.errors import ModelError, unknown_name
 from hybrid.system.checks import check_angles, check_functions
+from hybrid.system.delayed import has_delays, written_out
 from hybrid.system.described import described, described_in_html
 from hybrid.system.elements import END, Mode, Transition
 from hybrid.system.functions import ModelFunction, functions_in
@@ -22,6 +23,7 @@ from hybrid.system.given import (
     as_notes,
     as_period,
     as_transitions,
+    as_under_way,
     check_derived_from,
     check_growth,
     check_laws,
@@ -164,6 +166,8 @@ class HybridSystem(Portable):
     laws: Laws = attrs.field(factory=Laws, kw_only=True, eq=False, repr=False, validator=check_laws)
     # Lines for `repr`: what short names in a derived system stand for.
     notes: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=as_notes, repr=False)
+    # Components that hold what delays have under way, which no author names.
+    under_way: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=as_under_way, repr=False)
     # What makes further modes, for a system that is made in stages.
     growth: Growth | None = attrs.field(default=None, kw_only=True, validator=check_growth, repr=False)
     # What the functions read that this system was derived from.
@@ -178,6 +182,8 @@ class HybridSystem(Portable):
     _made_by: Any = attrs.field(default=None, init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
+        if has_delays(self.transitions):
+            self._write_out_delays()
         check_outputs(self.outputs, self.variables)
         object.__setattr__(self, "units", self.variables.as_units(self.units, self.outputs))
         self._check_graph()
@@ -187,6 +193,17 @@ class HybridSystem(Portable):
         unchecked = self._unchecked()
         check_functions(self.variables, unchecked, self.period)
         check_angles(self.variables, unchecked, self.turn_lengths)
+
+    def _write_out_delays(self) -> None:
+        """Check what the author wrote, and put components for what is under way into the state."""
+        own = Variables(self.state, self.parameters, self.held, self.counters)
+        self._check_graph()
+        functions = [each for _, each in functions_in(self.modes, self.transitions, own)]
+        check_functions(own, functions, self.period)
+        turns = own.as_angles(self.angles)
+        check_angles(own, functions, np.array([turns.get(name, 0.0) for name in own.state_names]))
+        for name, value in written_out(self, own).items():
+            object.__setattr__(self, name, value)
 
     def __reduce__(self) -> tuple[Any, ...]:
         if self._made_by is None:
@@ -231,7 +248,7 @@ class HybridSystem(Portable):
     @cached_property
     def variables(self) -> Variables:
         """The state and the parameters, with the views of them that model functions get."""
-        return Variables(self.state, self.parameters, self.held, self.counters)
+        return Variables(self.state, self.parameters, self.held, self.counters, self.under_way)
 
     @property
     def dimension(self) -> int:
@@ -254,6 +271,11 @@ class HybridSystem(Portable):
     def state_names(self) -> tuple[str, ...]:
         """Names of all components of ``x``; ``x0, x1, ...`` if only their number was given."""
         return self.variables.state_names
+
+    @property
+    def own_names(self) -> tuple[str, ...]:
+        """Names of the components without those that hold what delays have under way."""
+        return tuple(name for name in self.state_names if name not in self.under_way)
 
     @property
     def quantity_names(self) -> tuple[str, ...]:

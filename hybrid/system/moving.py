@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import ModelError
-from hybrid.system.clocks import Clock, DerivedClock, Quantity
+from hybrid.system.clocks import Clock, Quantity
 from hybrid.system.elements import Transition
 from hybrid.system.variables import Variables
 
@@ -23,7 +23,7 @@ def moving_numbers(transition: Transition, variables: Variables) -> tuple[int, .
     clock = transition.clock
     if clock is None or isinstance(variables.state, int):
         return ()
-    if isinstance(clock, DerivedClock):
+    if clock.moving is not None:
         return clock.moving
     found, kept = [], {*variables.held, *variables.counters}
     for place, quantity in enumerate(clock.quantities):

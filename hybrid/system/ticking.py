@@ -27,7 +27,7 @@ def put_ticks(
             if fault:
                 # In the order in which they were given.
                 fault = fault_of(clock, tuple(map(float, numbers_of(clock, view, p))), bool(moving))
-                owner = f"Transition {transition.name!r}: {type(clock).__name__}"
+                owner = f"Transition {transition.name!r}: {clock.kind}"
                 raise ArgumentError(f"{owner}: {fault} with these parameters.")
             ticks[first : first + len(numbers)] = numbers
             if row is not None:

@@ -89,12 +89,15 @@ class Variables:
         Names of the components that only resets change.
     counters
         Names of the whole numbers that only resets change.
+    under_way
+        Those of all these names that hold what delays have under way: a start may leave them out.
     """
 
     state: tuple[str, ...] | int
     parameters: Mapping[str, float]
     held: tuple[str, ...] = ()
     counters: tuple[str, ...] = ()
+    under_way: tuple[str, ...] = ()
 
     def __attrs_post_init__(self) -> None:
         if isinstance(self.state, int) and (self.held or self.counters):
@@ -185,7 +188,8 @@ class Variables:
         """A finite state ``(n,)`` from the argument ``name``: numbers in order, or with names as labels.
 
         Labels have a mapping, a Series of pandas, and a DataArray of xarray with a coordinate of names. Held
-        components and counters are 0 where labels leave them out, or numbers in order stop before them.
+        components and counters are 0 where labels leave them out, or numbers in order stop before them, and
+        so is what delays have under way.
 
         Raises
         ------
@@ -219,10 +223,19 @@ class Variables:
         return found
 
     def completed(self, states: np.ndarray) -> np.ndarray:
-        """States ``(..., n)``, with 0 for what is held or counts where only the others are given."""
-        if self.moving == self.dimension or states.ndim == 0 or states.shape[-1] != self.moving:
+        """States ``(..., n)``, with 0 for what is held, counts or is under way where others alone are given."""
+        if states.ndim == 0 or states.shape[-1] not in self._given:
             return states
-        return np.concatenate([states, np.zeros((*states.shape[:-1], self.dimension - self.moving))], axis=-1)
+        found = np.zeros((*states.shape[:-1], self.dimension))
+        found[..., self._given[states.shape[-1]]] = states
+        return found
+
+    @cached_property
+    def _given(self) -> dict[int, list[int]]:
+        """The places of the components that a start gives, by how many it gives, where that is not all."""
+        own = [i for i, name in enumerate(self.state_names) if name not in self.under_way]
+        moving = [i for i in own if i < self.moving]
+        return {len(each): each for each in (moving, own) if len(each) < self.dimension}
 
     def check_counts(self, name: str, states: np.ndarray) -> None:
         """ArgumentError unless the counters of the states ``(..., n)`` in the argument ``name`` are whole."""
@@ -244,7 +257,7 @@ class Variables:
             return None
         for component in given:
             arguments.known(f"{name}: State component", component, self.state_names, "State components")
-        given = dict.fromkeys(self.state_names[self.moving :], 0.0) | given
+        given = dict.fromkeys((*self.state_names[self.moving :], *self.under_way), 0.0) | given
         missing = [component for component in self.state_names if component not in given]
         if missing:
             raise ArgumentError(

@@ -18,7 +18,7 @@ from hybrid.kernels.arithmetic.clock import (
 )
 from hybrid.kernels.arithmetic.tables import knots_passed
 from hybrid.kernels.events.guards import allowed
-from hybrid.kernels.types.codes import AFTER, AT, EVERY, NO_MODE, NO_TRANSITION
+from hybrid.kernels.types.codes import AFTER, AT, EVERY, NO_MODE, NO_TRANSITION, UNDER_WAY
 from hybrid.kernels.types.layout import EPSILON
 from hybrid.kernels.types.options import INLINE, KERNEL
 
@@ -28,9 +28,11 @@ ROUNDING_OF_TICK = 2 * EPSILON
 
 @njit(**INLINE)
 def begin_of_count(model, run, transition):
-    """The period, the phase, and its rounding, from which a clock counts that begins with its mode."""
+    """The period, the phase, and its rounding, from which a clock counts that begins at an instant."""
     if model.clock[transition] == AFTER:
         return run.entry_cycle, run.entry_phase, run.entry_low
+    if model.clock[transition] == UNDER_WAY:
+        return run.reading_cycle, run.reading_phase, run.reading_low
     return run.arrival_cycle, run.arrival_phase, run.arrival_low
 
 
@@ -49,7 +51,7 @@ def place_of_tick(model, run, transition, k):
         more = run.ticks[first + k]
     else:
         begin, high, low = begin_of_count(model, run, transition)
-        cycles, more = cycles + begin, run.ticks[first]
+        cycles, more = cycles + begin, run.ticks[first + k]
     whole, rest = product_in_two_parts(float(cycles), model.period)
     total, lost = sum_in_two_parts(high, whole)
     total, more_lost = sum_in_two_parts(total, more)
@@ -75,7 +77,8 @@ def rounding_of_tick(model, run, transition, k):
     if kind == AT:
         return ROUNDING_OF_TICK * abs(run.ticks[first + min(k, model.first_tick[transition + 1] - first - 1)])
     begin, phase, _ = begin_of_count(model, run, transition)
-    return ROUNDING_OF_TICK * (abs(begin * model.period + phase) + abs(run.ticks[first]))
+    number = abs(run.ticks[first + min(k, model.first_tick[transition + 1] - first - 1)])
+    return ROUNDING_OF_TICK * (abs(begin * model.period + phase) + number)
 
 
 @njit(**KERNEL)
@@ -144,6 +147,12 @@ def wind(model, run):
     for slot in range(model.first_clock[mode], model.first_clock[mode + 1]):
         transition = model.clocks[slot]
         own = model.tick_of[transition]
+        if model.clock[transition] == UNDER_WAY:
+            # A tick that has fired is no longer in the list.
+            run.tick[own] = 0
+            while is_behind(model, run, transition, run.tick[own]):
+                run.tick[own] += 1
+            continue
         if model.clock[transition] >= AFTER:
             begins = entered if model.clock[transition] == AFTER else starts or moved
             run.tick[own] = 0 if begins else run.tick[own]

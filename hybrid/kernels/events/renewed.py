@@ -13,6 +13,7 @@ from hybrid.kernels.types.options import KERNEL
 def renew(model, run, scalar):
     """Read the numbers of clocks that resets may change; whether all are numbers that a clock can have."""
     first_number = 2 * model.target.shape[0]
+    run.reading_cycle, run.reading_phase, run.reading_low = run.cycle, run.phase, run.phase_low
     for i in range(model.moving.shape[0]):
         place, transition = model.moving[i], model.mover[i]
         model.guard(first_number + i, run.phase, run.y, model.parameters, scalar)

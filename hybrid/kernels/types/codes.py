@@ -45,8 +45,8 @@ BY_NOTHING, BY_FLOW, BY_GUARD = range(3)
 NO_MODE = -1
 
 # Kinds of clocks, as ``hybrid.system.clocks`` numbers them; 0 for a guard. An arrival is an entry from
-# another mode.
-EVERY, AT, AFTER, AFTER_ARRIVAL = range(1, 5)
+# another mode. Ticks that are under way count from when they were read.
+EVERY, AT, AFTER, AFTER_ARRIVAL, UNDER_WAY = range(1, 6)
 # Number of the next tick of a clock that has not been wound up yet.
 FIRST_TICK = -(2**62)
 

@@ -37,6 +37,7 @@ COUNTERS = (
     "jumped_in",
     "entry_cycle",
     "arrival_cycle",
+    "reading_cycle",
     "turned",
     "turned_to",
     "row",
@@ -74,4 +75,6 @@ NUMBERS = (
     "entry_low",
     "arrival_phase",
     "arrival_low",
+    "reading_phase",
+    "reading_low",
 )

@@ -246,7 +246,8 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
       duration. ``rows`` are the places of the times before they were put in order, ``row`` that of the last
       to fire.
       The mode was entered in the period ``entry_cycle`` at ``entry_phase``, and ``entry_low`` of rounding;
-      the same three numbers of the ``arrival`` tell when it was entered from another mode.
+      the same three numbers of the ``arrival`` tell when it was entered from another mode, and those of the
+      ``reading`` when the numbers of clocks that resets may change were last read.
       ``turned``: jumps at ticks that changed which transition of their clock may fire, last to ``turned_to``.
     - ``clear``: 1 if the last jump has left the state clear of all guards but its own, whose sides are in
       ``tried_side``. ``distant``: 1 if the last step has proved that all guards are far from zero at its end;

@@ -1,0 +1,183 @@
+"""What a delay has under way, as components of the state: a list of due times in order, and its clock.
+
+The due times count from the last change of the list, and its clock is the time since then. So the components
+do not depend on the origin of time: they return where a motion repeats, and orbits close over them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import reduce
+from typing import Any
+
+import attrs
+import numpy as np
+
+from hybrid.system.clocks import Clock, Quantity, read
+from hybrid.system.delay import Delay
+
+# The time left where nothing is under way.
+NEVER = 1e300
+# A wait whose end lies behind by more than this share of the duration is over. Whether one that lies behind
+# by less fires, its clock tells, up to rounding.
+OVER = 1e-6
+
+
+@attrs.frozen
+class Places:
+    """The names of the components that hold what is under way, and how the list of due times changes.
+
+    Attributes
+    ----------
+    duration
+        How long each waits, as the user gave it.
+    is_held
+        Whether it reads what resets change, which may make it negative.
+    misses
+        Whether a wait may end without a jump.
+    clock
+        The time since the last change of the list; it stands still while nothing is under way.
+    due
+        The due times in order, on that clock; 0 in places that are free.
+    count, busy
+        How many are under way, and whether any is, 1 or 0: the rate of the clock.
+    """
+
+    duration: Quantity
+    is_held: bool
+    misses: bool
+    clock: str
+    due: tuple[str, ...]
+    count: str
+    busy: str
+
+    def wait(self, x: Any, p: Any) -> Any:
+        """How long what begins at a state waits."""
+        found = read(self.duration, x, p)
+        return np.maximum(found, 0.0) if self.is_held else found
+
+    def left(self, x: Any) -> list[Any]:
+        """The time left of each that is under way, in order, then ``NEVER``."""
+        now, count = getattr(x, self.clock), getattr(x, self.count)
+        return [
+            np.where(count > i + 0.5, getattr(x, name) - now, NEVER) for i, name in enumerate(self.due)
+        ]
+
+    def numbers(self, x: Any, p: Any) -> tuple[Any, ...]:
+        """The time left of each, and one number that is never reached, or tells what is wrong."""
+        last = np.where(getattr(x, self.count) > len(self.due) + 0.5, np.inf, NEVER)
+        if not (self.is_held or isinstance(self.duration, float)):
+            wait = read(self.duration, x, p)
+            last = np.where(wait < 0.0, wait, last)
+        return *self.left(x), last
+
+    def after(self, x: Any, wait: Any, fires: bool, begins: bool) -> dict[str, Any]:
+        """The components after a jump at ``x``, which ``fires`` at a tick, or ``begins`` a wait, or both."""
+        left, count = self.left(x), getattr(x, self.count)
+        if self.misses:
+            gone = _place_at_zero(left) + 1.0 if fires else sum(_truth(each < -OVER * wait) for each in left)
+            left, count = _without(left, gone), count - gone
+        elif fires:
+            left, count = [*left[1:], NEVER], count - 1.0
+        if begins:
+            left, count = _with(left, wait), count + 1.0
+        due = {name: np.where(count > i + 0.5, left[i], 0.0) for i, name in enumerate(self.due)}
+        return {self.clock: 0.0, **due, self.count: count, self.busy: _truth(count > 0.5)}
+
+
+def _truth(condition: Any) -> Any:
+    """1 where a condition holds, else 0."""
+    return np.where(condition, 1.0, 0.0)
+
+
+def _place_at_zero(left: Sequence[Any]) -> Any:
+    """The first place whose time left is nearest to zero: the one that fires."""
+    place, least = 0.0, abs(left[0])
+    for i, each in enumerate(left[1:], 1):
+        nearer = abs(each) < least
+        place, least = np.where(nearer, float(i), place), np.where(nearer, abs(each), least)
+    return place
+
+
+def _without(left: Sequence[Any], gone: Any) -> list[Any]:
+    """The list without so many of its first entries."""
+    return [
+        reduce(lambda found, k: np.where(gone > k - 0.5, left[k + i] if k + i < len(left) else NEVER, found),
+               range(1, len(left) + 1), left[i])
+        for i in range(len(left))
+    ]  # fmt: skip
+
+
+def _with(left: Sequence[Any], wait: Any) -> list[Any]:
+    """The list with one entry more, behind those that are equal; the last one falls out if it is full."""
+    before = [wait < each for each in left]
+    return [
+        np.where(here, wait if i == 0 else np.where(before[i - 1], left[i - 1], wait), each)
+        for i, (here, each) in enumerate(zip(before, left, strict=True))
+    ]
+
+
+@attrs.frozen
+class UnderWay(Clock):
+    """The clock of a `Delay` in its system: it ticks where the waits that are under way end.
+
+    Attributes
+    ----------
+    delay
+        The clock as its author wrote it.
+    places
+        The components that hold what is under way.
+    when
+        The condition of a tick as a function of the whole state.
+    """
+
+    delay: Delay
+    places: Places
+    when: Callable[..., Any] | None  # type: ignore[misc]
+
+    @property
+    def kind(self) -> str:
+        """What its author wrote."""
+        return self.delay.kind
+
+    @property
+    def number(self) -> int:  # type: ignore[override]
+        """That of the delay."""
+        return self.delay.number
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """One for each number: resets move them all."""
+        return (*self.places.due, self.places.count)
+
+    @property
+    def moving(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The places of the numbers that resets move: all."""
+        return tuple(range(len(self.quantities)))
+
+    @property
+    def told(self) -> str:
+        """When the clock ticks, in few words."""
+        return self.delay.told
+
+    def _numbers(self, x: Any, p: Any) -> tuple[Any, ...]:
+        """The times left, and a number that tells what is wrong."""
+        return self.places.numbers(x, p)
+
+    def _since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
+        """The time since the tick that is nearest, negative before it."""
+        left, *others = numbers[:-1]
+        for each in others if self.places.misses else ():
+            left = np.where(abs(each) < abs(left), each, left)
+        return -left
+
+    def _fault(self, numbers: Sequence[float], moving: bool = False) -> str:
+        """What is wrong with the numbers."""
+        *left, last = numbers
+        if last < 0.0:
+            return self.delay._fault([last])
+        if last == math.inf:
+            return f"places must be more than {len(left)}, as more are under way"
+        bad = [each for each in left if not math.isfinite(each)]
+        return f"duration must be finite; got {bad[0]:.6g}" if bad else ""
