@@ -64,7 +64,8 @@ class Shot:
     knows how far components at rest are carried. ``beyond`` names the transitions whose guards the start lies
     beyond. ``departure`` is how far the start is from the values of conserved quantities that are held.
     ``lengths (n,)`` are those of a turn of angles, 0 for other components. ``at_steps`` is the largest
-    absolute value at the ends of steps, which the solver's tolerances control.
+    absolute value at the ends of steps, which the solver's tolerances control. ``more_waits`` tells whether
+    more delays are under way at the end than at the start, or fewer.
     """
 
     point: Point
@@ -82,6 +83,7 @@ class Shot:
     departure: Departure | None = None
     lengths: np.ndarray | None = None
     at_steps: float = np.inf
+    more_waits: bool = False
 
     @property
     def gap(self) -> np.ndarray:
@@ -108,8 +110,9 @@ class Shot:
 
     @property
     def whole(self) -> bool:
-        """Whether the run reached its end, in the mode where it began, with finite tangent vectors."""
-        return self.reached and self.end_mode == self.mode and bool(np.all(np.isfinite(self.fundamental)))
+        """Whether the run came back to its mode, with as much under way, and with finite tangent vectors."""
+        back = self.reached and self.end_mode == self.mode and not self.more_waits
+        return back and bool(np.all(np.isfinite(self.fundamental)))
 
     @property
     def rounding(self) -> np.ndarray:

@@ -15,6 +15,8 @@ from hybrid.errors import ArgumentError
 from hybrid.orbits.newton import Point
 from hybrid.orbits.orbit import PeriodicOrbit, unaged
 from hybrid.orbits.shooting import Shooting
+from hybrid.orbits.undeclared import hinted
+from hybrid.orbits.waits import settled
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.periods import check_time
 from hybrid.simulation.plan import check_solver
@@ -122,8 +124,9 @@ def periodic_orbit(
         compile_system(system)
         _check_clocks(system, state, parameters, t0, point.period)
         with CTRL_C:
-            return _shown(shooting.hinted(shooting.forced(point, tolerance, max_iterations), point))
-    ticking = [each.name for each in system.transitions if each.clock and not each.clock.counts_from_entry]
+            shooting, point = settled(shooting, point)
+            return _shown(hinted(shooting, shooting.forced(point, tolerance, max_iterations), point))
+    ticking = [each.name for each in system.transitions if each.clock and each.clock.reads_time]
     if ticking:
         raise ArgumentError(
             f"system: the clock of transition {ticking[0]!r} makes it depend on time, so it has orbits only "
@@ -136,8 +139,8 @@ def periodic_orbit(
         raise arguments.refusal("period", "be a time that the clock can reach twice", length)
     compile_system(system)
     with CTRL_C:
-        point = Point(guess, t0, length)
-        return _shown(shooting.hinted(shooting.autonomous(point, tolerance, max_iterations), point))
+        shooting, point = settled(shooting, Point(guess, t0, length))
+        return _shown(hinted(shooting, shooting.autonomous(point, tolerance, max_iterations), point))
 
 
 def _check_clocks(
@@ -148,7 +151,7 @@ def _check_clocks(
     view, p = variables.state_view(x), variables.parameter_view(system.parameter_values(parameters).tolist())
     for transition in system.transitions:
         clock = transition.clock
-        if clock is None or clock.counts_from_entry:
+        if clock is None or not clock.reads_time:
             continue
         numbers = np.array(numbers_of(clock, view, p), dtype=float)
         if clock.number == Every.number:

@@ -17,6 +17,7 @@ from hybrid.orbits.lap import Fired, Lap, lap_of
 from hybrid.orbits.newton import ROUNDING_OF_GAP, Newton, Point, Shot, length
 from hybrid.orbits.orbit import PeriodicOrbit, closes, turns_over
 from hybrid.orbits.rest import EPSILON, drift
+from hybrid.orbits.waits import waits_change
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.simulate import simulate
@@ -24,8 +25,8 @@ from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode, noting
 from hybrid.system.entries import are_ageless
-from hybrid.system.graph import HybridSystem, functions_of
-from hybrid.system.periodicity import angle_fault_at, closed_change
+from hybrid.system.graph import HybridSystem
+from hybrid.system.periodicity import closed_change
 
 # Points, besides the solver's own, that show how far an orbit moves.
 SAMPLES = 65
@@ -57,8 +58,6 @@ NEARER = 0.5
 NEARLY_SINGULAR = 1e-5
 # A multiplier may be 1 if it is this near: of a double one that is the root of its error.
 NEAR_ONE = 1e-3
-# The turn of an angle that is not declared.
-TURN = 2.0 * np.pi
 FAMILY = "The orbit is one of a family"
 # What helps a search that found no orbit.
 START_NEARER = "Start nearer to the orbit: simulate first if it is stable."
@@ -69,6 +68,10 @@ MORE_ITERATIONS = (
 NAME_THE_MODE = (
     "Start in the mode that the orbit is in at this time: name it with mode=, or simulate first and start "
     "from the end of that run, with its mode."
+)
+START_IN_THE_RUN = (
+    "Simulate first, and start from the end of that run, arc.x[-1] with mode=arc.end.mode: it holds what is "
+    "under way."
 )
 HOLD_IT = (
     "If the system conserves a quantity, declare it with HybridSystem(laws=Laws(conserved=...)): the search "
@@ -101,7 +104,7 @@ class Shooting:
         trajectory, n = self._trajectory(point, self.mode), self.system.tangent_dimension
         mode, field = trajectory.mode, trajectory.field()[:n]
         code = trajectory.advance(point.t + point.period, trajectory.no_record())
-        arc = self._follow(point, point.period, mode)
+        arc = self.follow(point, point.period, mode)
         states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], SAMPLES))])[:, :n]
         extent, magnitude = np.ptp(states, axis=0), np.abs(states).max(axis=0)
         at_rest, carried = extent <= ROUNDING_OF_GAP * EPSILON * magnitude, None
@@ -124,6 +127,7 @@ class Shooting:
             None if self.held is None else self.held.departure(point.t, point.x, magnitude),
             self.system.turn_lengths[:n],
             float(np.abs(arc.x).max()),
+            more_waits=waits_change(self.system, arc),
         )
 
     def _trajectory(self, point: Point, mode: str | None) -> Trajectory:
@@ -246,34 +250,9 @@ class Shooting:
         asked = Asked(guess, mode, self.counters)
         return attrs.evolve(shooting, asked=asked).newton(moved, False, tolerance, max_iterations)
 
-    def hinted(self, orbit: PeriodicOrbit, guess: Point) -> PeriodicOrbit:
-        """The orbit, with a remedy for a search that failed since a component counts turns."""
-        if orbit.status.code != StatusCode.NOT_CONVERGED:
-            return orbit
-        moved = self._follow(guess, guess.period, self.mode).x[-1] - self.whole(guess)
-        for i in np.flatnonzero(np.abs(moved) > 0.5 * TURN).tolist():
-            if self.system.turn_lengths[i] == 0.0 and self._is_same_after_a_turn(i, guess):
-                name = self.system.state_names[i]
-                hint = (
-                    f"{name!r} moves by {moved[i]:.6g}, and a turn of 2 pi changes no function: if it is an "
-                    f"angle, declare it with HybridSystem(angles={{{name!r}: 2 * np.pi}})."
-                )
-                status = attrs.evolve(orbit.status, remedy=f"{orbit.status.remedy} {hint}".strip())
-                return attrs.evolve(orbit, status=status)
-        return orbit
-
-    def _is_same_after_a_turn(self, i: int, guess: Point) -> bool:
-        """Whether no function changes where a component is larger by 2 pi."""
-        system, values = self.system, self.system.parameter_values(self.parameters)
-        lengths = TURN * (np.arange(system.dimension) == i)
-        return all(
-            angle_fault_at(system.variables, function, guess.t, self.whole(guess), values, lengths) is None
-            for _, function in functions_of(system)
-        )
-
     def _quiet_time(self, guess: Point) -> float:
         """The first time after the guess with jumps at least half as far as anywhere; 0 without jumps."""
-        arc = self._follow(guess, 2 * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
+        arc = self.follow(guess, 2 * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
         if len(arc.jumps) == 0 or not arc.status.ok:
             return 0.0
         candidates, distance = self._quietness(arc, guess, arc.jumps.t - guess.t)
@@ -281,7 +260,7 @@ class Shooting:
 
     def _quietest_time(self, guess: Point) -> float:
         """The time after the guess at which neither it nor one period later is close to a jump."""
-        arc = self._follow(guess, 2 * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
+        arc = self.follow(guess, 2 * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
         candidates, distance = self._quietness(arc, guess, np.concatenate([[0.0], arc.jumps.t - guess.t]))
         return float(candidates[np.argmax(distance)])
 
@@ -297,7 +276,7 @@ class Shooting:
         return candidates, distance
 
     def _moved(self, guess: Point, shift: float) -> tuple[Shooting, Point]:
-        arc = self._follow(guess, shift, self.mode)
+        arc = self.follow(guess, shift, self.mode)
         state, counters = np.split(arc.x[-1], [self.system.tangent_dimension])
         shooting = attrs.evolve(self, mode=str(arc.mode[-1]), counters=counters)
         return shooting, Point(state, guess.t + shift, guess.period)
@@ -307,7 +286,7 @@ class Shooting:
 
         With a wrong period, Newton's method prefers smaller orbits where orbits come in families.
         """
-        arc = self._follow(guess, (1 + PERIOD_OFF) * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
+        arc = self.follow(guess, (1 + PERIOD_OFF) * guess.period, self.mode, max_jumps=MOST_JUMPS_LOOKED_AT)
         times = guess.period * (1 + PERIOD_OFF * np.linspace(-1, 1, 2 * SAMPLES - 1))
         if not arc.status.ok:
             return guess.period
@@ -371,7 +350,7 @@ class Shooting:
 
     def _lap(self, shot: Shot) -> tuple[Lap, list[Fired]]:
         """The run over the period, stretch by stretch and cut at the time of the guess, and its jumps."""
-        point, jumps = shot.point, self._follow(shot.point, shot.point.period, shot.mode).jumps
+        point, jumps = shot.point, self.follow(shot.point, shot.point.period, shot.mode).jumps
         stops = [point.t + point.period]
         if self.asked is not None and not any(self.asked.is_at(jump.t) for jump in jumps):
             stops = [self.asked.t, *stops]
@@ -398,7 +377,7 @@ class Shooting:
         noise = np.maximum(np.abs(rough - drift) / TIGHTER, shot.rounding[:, None])
         return bool(np.any(np.abs(drift) > noise))
 
-    def _follow(self, point: Point, span: float, mode: str | None, max_jumps: int = 100_000) -> HybridArc:
+    def follow(self, point: Point, span: float, mode: str | None, max_jumps: int = 100_000) -> HybridArc:
         """The arc from a point over a time, without tangent vectors."""
         return simulate(
             self.system,
@@ -456,6 +435,8 @@ class Shooting:
         """
         if shot.end_mode != shot.mode:
             return f"the orbit ends in mode {shot.end_mode!r} and starts in {shot.mode!r}", NAME_THE_MODE
+        if shot.more_waits:
+            return "more, or fewer, delays are under way at its end than at its start", START_IN_THE_RUN
         if not shot.whole or not newton.measurable(shot):
             return "the tangent vectors left the range of numbers", START_NEARER
         growth = shot.growth(newton.scale)

@@ -27,6 +27,9 @@ AT_REST = 1e-3
 BEFORE_REST = 0.02 * np.arange(1, 7)
 TO_REST = np.array([6.0, -15.0, 20.0, -15.0, 6.0, -1.0])
 
+# A wait that ends within this share of the time of a run ends at once.
+AT_ONCE = 1e-9
+
 
 @attrs.frozen(eq=False)
 class Sensitivities:
@@ -90,20 +93,32 @@ class Sensitivities:
         instants = np.searchsorted(first, np.arange(len(jumps)), side="right") - 1
         for k in range(1, len(jumps)):
             if jumps.t[k] == jumps.t[k - 1] and jumps.kind[k] != "limit":
-                tick = self._time_of_tick(jumps[k], places[instants[k]][1]) if instants[k] >= 0 else None
+                i = instants[k]
+                tick = self._time_of_tick(jumps[k], jumps[int(first[i])], places[i][1]) if i >= 0 else None
                 found[k] = found[k - 1] if tick is None else tick
         return self._of_run(found)
 
-    def _time_of_tick(self, jump: Jump, tangents: np.ndarray) -> np.ndarray | None:
+    def _time_of_tick(self, jump: Jump, first: Jump, tangents: np.ndarray) -> np.ndarray | None:
         """Derivatives ``(n + m,)`` of the time of a tick, which other jumps at its instant do not set off.
 
-        They depend on components that do not move, so ``tangents`` may be those of any time since the last
-        instant. None for other jumps.
+        They depend on components whose tangents do not move, so ``tangents`` may be those of any time since
+        the last instant. None for other jumps. ``first`` is the first jump of the instant.
         """
-        clock = self.arc.system.transitions[self.arc.system.transition_index(jump.transition)].clock
+        system = self.arc.system
+        clock = system.transitions[system.transition_index(jump.transition)].clock
         if clock is None or clock.counts_from_entry:
             return None
-        slope, _ = self._slope(jump, jump.t, self._place(jump))
+        place = self._place(jump if clock.reads_time else first)
+        if not clock.reads_time:
+            # A wait that a jump of this instant has begun was not under way before.
+            x, p = (
+                system.variables.state_view(place),
+                system.variables.parameter_view(self.arc.parameters.values()),
+            )
+            since = clock.function(jump.t, x, p)
+            if not abs(since) <= AT_ONCE * abs(jump.t - self.t0):
+                return None
+        slope, _ = self._slope(jump, jump.t, place)
         return -(slope @ tangents) / jump.transversality
 
     def _place(self, jump: Jump) -> np.ndarray:

@@ -134,6 +134,8 @@ class Clock(Portable):
     restarts: ClassVar[bool] = True
     # The component of the state that is the time since the entry of the mode, if there is one.
     age: ClassVar[int | None] = None
+    # Whether it ticks at given times, so that its system depends on time.
+    reads_time: ClassVar[bool] = True
     # The places of the numbers that resets may change, where they do not follow from what the author wrote.
     moving: ClassVar[tuple[int, ...] | None] = None
 
@@ -315,6 +317,7 @@ class After(Clock):
     when: Callable[..., Any] | None = attrs.field(default=None, kw_only=True, validator=check_when)
     restarts: bool = attrs.field(default=True, kw_only=True, converter=_as_restarts)  # type: ignore[misc]
     counts_from_entry: ClassVar[bool] = True
+    reads_time: ClassVar[bool] = False
 
     @property
     def number(self) -> int:  # type: ignore[override]
@@ -373,6 +376,11 @@ class DerivedClock(Clock):
     def counts_from_entry(self) -> bool:  # type: ignore[override]
         """As the original."""
         return self.clock.counts_from_entry
+
+    @property
+    def reads_time(self) -> bool:  # type: ignore[override]
+        """As the original."""
+        return self.clock.reads_time
 
     @property
     def restarts(self) -> bool:  # type: ignore[override]

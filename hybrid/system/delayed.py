@@ -7,7 +7,6 @@ from itertools import count
 from typing import Any
 
 import attrs
-import numpy as np
 
 from hybrid.errors import ModelError, unknown_name
 from hybrid.system.clocks import Clock
@@ -252,6 +251,6 @@ def _check_trigger(transition: Transition, transitions: Sequence[Transition]) ->
             raise ModelError(unknown_name(what, name, tuple(known), "Transitions"))
         if known[name].target is None:
             raise ModelError(
-                f"Transition {transition.name!r}: Delay: trigger {name!r} has no target: it ends the run, and "
-                "nothing follows. Name another transition."
+                f"Transition {transition.name!r}: Delay: trigger {name!r} has no target: it ends the run, "
+                "and nothing follows. Name another transition."
             )

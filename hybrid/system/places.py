@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import reduce
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
@@ -60,9 +60,7 @@ class Places:
     def left(self, x: Any) -> list[Any]:
         """The time left of each that is under way, in order, then ``NEVER``."""
         now, count = getattr(x, self.clock), getattr(x, self.count)
-        return [
-            np.where(count > i + 0.5, getattr(x, name) - now, NEVER) for i, name in enumerate(self.due)
-        ]
+        return [np.where(count > i + 0.5, getattr(x, name) - now, NEVER) for i, name in enumerate(self.due)]
 
     def numbers(self, x: Any, p: Any) -> tuple[Any, ...]:
         """The time left of each, and one number that is never reached, or tells what is wrong."""
@@ -71,6 +69,20 @@ class Places:
             wait = read(self.duration, x, p)
             last = np.where(wait < 0.0, wait, last)
         return *self.left(x), last
+
+    def fault(self, x: Any, p: Any) -> str:
+        """What is wrong with a state that no run leaves, in words; empty if it is right."""
+        count, busy = float(getattr(x, self.count)), float(getattr(x, self.busy))
+        if not 0.0 <= count <= len(self.due):
+            return f"{self.count!r} must be from 0 to {len(self.due)}; got {count:.6g}"
+        if busy != (count > 0.0):
+            return f"{self.busy!r} must be 1 while any is under way, else 0; got {busy:.6g}"
+        left = [float(each) for each in self.left(x)[: int(count)]]
+        if left != sorted(left):
+            return f"{self.due[0]!r} to {self.due[len(left) - 1]!r} must not fall; got {left}"
+        if left and not self.misses and left[0] < -OVER * float(self.wait(x, p)):
+            return f"{self.due[0]!r} must not be less than {self.clock!r}: a tick was {-left[0]:.6g} ago"
+        return ""
 
     def after(self, x: Any, wait: Any, fires: bool, begins: bool) -> dict[str, Any]:
         """The components after a jump at ``x``, which ``fires`` at a tick, or ``begins`` a wait, or both."""
@@ -135,6 +147,7 @@ class UnderWay(Clock):
     delay: Delay
     places: Places
     when: Callable[..., Any] | None  # type: ignore[misc]
+    reads_time: ClassVar[bool] = False
 
     @property
     def kind(self) -> str:

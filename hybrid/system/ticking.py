@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from hybrid.errors import ArgumentError
 from hybrid.system.clocks import fault_of, numbers_of, ticks_of
 from hybrid.system.graph import HybridSystem
+from hybrid.system.places import UnderWay
 
 
 def put_ticks(
@@ -24,6 +27,8 @@ def put_ticks(
         if clock is not None:
             numbers, row = ticks_of(clock, view, p)
             fault = fault_of(clock, numbers, bool(moving))
+            if isinstance(clock, UnderWay) and not fault:
+                _check_under_way(transition.name, clock, view, p)
             if fault:
                 # In the order in which they were given.
                 fault = fault_of(clock, tuple(map(float, numbers_of(clock, view, p))), bool(moving))
@@ -32,3 +37,13 @@ def put_ticks(
             ticks[first : first + len(numbers)] = numbers
             if row is not None:
                 rows[first : first + len(numbers)] = row
+
+
+def _check_under_way(name: str, clock: UnderWay, x: Any, p: Any) -> None:
+    """ArgumentError unless a state may be that of a run with delays."""
+    fault = clock.places.fault(x, p)
+    if fault:
+        raise ArgumentError(
+            f"x0 cannot hold what transition {name!r} has under way: {fault}. Leave these components out of "
+            "x0, so that nothing is under way, or give a state of a run, such as arc.x[-1]."
+        )

@@ -223,7 +223,7 @@ class Variables:
         return found
 
     def completed(self, states: np.ndarray) -> np.ndarray:
-        """States ``(..., n)``, with 0 for what is held, counts or is under way where others alone are given."""
+        """States ``(..., n)``, with 0 for what is held, counts or is under way if others alone are given."""
         if states.ndim == 0 or states.shape[-1] not in self._given:
             return states
         found = np.zeros((*states.shape[:-1], self.dimension))

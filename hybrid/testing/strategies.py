@@ -56,7 +56,7 @@ def states(
         The model.
     ranges
         By component: a range ``(low, high)``, a number to keep the component fixed, or a strategy; -2 to 2 by
-        default. Or one strategy for the whole state.
+        default, and 0 of what delays have under way. Or one strategy for the whole state.
 
     Raises
     ------
@@ -81,9 +81,11 @@ def _states(name: str, system: HybridSystem, ranges: Any) -> SearchStrategy[tupl
     names = as_system("system", system).state_names
     if isinstance(ranges, SearchStrategy):
         return ranges.map(lambda x: _drawn_state(name, len(names), x))
-    chosen = named(name, ranges, RANGES)
-    for each in chosen:
+    given = named(name, ranges, RANGES)
+    for each in given:
         arguments.known(f"{name}: State component", each, names, "State components")
+    # Nothing is under way, unless the author says so.
+    chosen = dict.fromkeys(system.under_way, 0.0) | given
     return st.tuples(
         *(
             st.integers(0, MOST_COUNTED).map(float)

@@ -11,13 +11,14 @@ import numpy as np
 
 from hybrid.simulation.jumps import Jump
 from hybrid.system.clocks import Clock, numbers_of
+from hybrid.system.delay import Delay
 from hybrid.system.elements import Transition
 from hybrid.system.entries import enters_anew, enters_itself
+from hybrid.system.places import UnderWay
 from hybrid.system.schedule import At
 from hybrid.testing.case import Case, as_case, jump_told
 from hybrid.testing.errors import discard
-
-TICKS = "A clock fires at each of its ticks, once"
+from hybrid.testing.waits import TICKS, check_waits
 
 # Ticks are known up to the rounding of a few operations with times.
 ROUNDING = 64.0 * float(np.finfo(float).eps)
@@ -50,9 +51,13 @@ def check_ticks(case: Case) -> None:
     >>> check_ticks(Case(doses, doses.parameters, "body", (0.0, 0.0), 0.0, 96.0))
     """
     arc = as_case(case).whole
-    clocks = [each for each in case.system.transitions if each.clock]
-    if arc is None or not clocks:
+    every = [each for each in case.system.transitions if each.clock]
+    if arc is None or not every:
         discard("no transition has a clock" if arc else "no mode allows the start")
+    clocks = [each for each in every if each.clock and each.clock.number != Delay.number]
+    for each in every:
+        if isinstance(each.clock, UnderWay):
+            check_waits(case, arc, each, each.clock)
     age = 0.0 if case.system.age is None else float(arc.x[0][case.system.age])
     begins, fired = Begins(case.t0 - age, case.t0 - age), set[tuple[str, int | None]]()
     times = [case.t0, *arc.jumps.t.tolist(), float(arc.t[-1])]
@@ -109,7 +114,7 @@ def _check_at(
     The jump before was at the time ``before``.
     """
     clock = case.transition(jump).clock
-    if clock is None:
+    if clock is None or clock.number == Delay.number:
         return
     numbers = _numbers(case, clock, jump.x_minus)
     band = _band(numbers, jump.t)

@@ -75,8 +75,8 @@ def axes_of(system: HybridSystem, over: object, reserved: tuple[str, ...] = ()) 
         name = plain_name(key) if isinstance(key, str) else key
         name = arguments.known("over: State component", name, names, "State components")
         found.append(_axis(name, key, value))
-    named, moving = {each.name for each in found}, system.variables.moving
-    missing = [name for name in names[:moving] if name not in named]
+    named, moving = {each.name for each in found}, names[: system.variables.moving]
+    missing = [name for name in moving if name not in named and name not in system.under_way]
     if missing:
         raise ArgumentError(
             f"over must name every component of the state; it lacks {', '.join(missing)}. "
@@ -87,7 +87,7 @@ def axes_of(system: HybridSystem, over: object, reserved: tuple[str, ...] = ()) 
             raise ArgumentError(
                 f"over: {each.name!r} is also the name of a result. Rename the state of the model."
             )
-    still = (name for name in names[moving:] if name not in named)
+    still = (name for name in names if name not in named)
     return [*found, *(Axis(name, np.array(0.0), False, {}) for name in still)]
 
 
