@@ -69,7 +69,7 @@ class Scene:
 
 def first_scene(subject: Subject) -> Scene:
     """What a page shows when it opens."""
-    names, parameters = subject.system.state_names, list(subject.values)
+    names, parameters = subject.system.own_names, list(subject.values)
     forced = subject.is_forced
     # Of a forced system the second half of the state is usually the speeds.
     second = names[len(names) // 2] if len(names) > 1 else names[0]
@@ -181,7 +181,7 @@ def section_names(subject: Subject) -> tuple[str, ...]:
     """Where a section of the system can be taken."""
     period = (PERIOD,) if subject.is_forced else ()
     jumps = (JUMPS,) if subject.system.transitions else ()
-    return (*period, *jumps, *subject.system.state_names)
+    return (*period, *jumps, *subject.system.own_names)
 
 
 def _number(name: str, text: str) -> float:

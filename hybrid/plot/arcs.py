@@ -63,7 +63,7 @@ def plot_arc(
     ('t (s)', 'q (m)')
     """
     system = _as_arc(arc).system
-    chosen = list(system.state_names) if components is None else _names(system, components)
+    chosen = list(system.own_names) if components is None else _names(system, components)
     axes = axes_for(ax, len(chosen), figsize=figsize)
     labels = Names(system.state_names, system.units)
     lines = curves(arc, chosen)

@@ -126,14 +126,14 @@ def plot_global_error(
     names = Names(system.state_names, system.units)
     count = 2 if len(bounds) else 1
     axes = axes_for(ax, count, (6.4, 0.8 + 2.2 * count), figsize, shared=False)
-    places = np.arange(system.dimension)
-    known = np.isfinite(result.x)
-    axes[0].plot(places[known], np.maximum(result.x[known], LEAST), "o", color=COLOURS[0])
+    errors = result.x[[system.state_names.index(name) for name in system.own_names]]
+    places, known = np.arange(len(errors)), np.isfinite(errors)
+    axes[0].plot(places[known], np.maximum(errors[known], LEAST), "o", color=COLOURS[0])
     if not known.all():
         mark(axes[0], places[~known], "^", COLOURS[1], "not known")
         small_legend(axes[0])
-    axes[0].set_xticks(places, [names.label(name) for name in names.state])
-    axes[0].set_xlim(-0.5, system.dimension - 0.5)
+    axes[0].set_xticks(places, [names.label(name) for name in system.own_names])
+    axes[0].set_xlim(-0.5, len(places) - 0.5)
     axes[0].set_ylabel("error of the last state")
     if len(bounds):
         t, known = result.arc.jumps.t, np.isfinite(bounds)

@@ -143,7 +143,7 @@ def plane_of(system: HybridSystem, x: str | int, y: str | int | None) -> tuple[s
     first = named_quantity("x", system, x)
     if y is not None:
         return first, named_quantity("y", system, y)
-    return first, beside(system.state_names, first)
+    return first, beside(system.own_names, first)
 
 
 def beside(names: Sequence[str], first: str) -> str | None:
