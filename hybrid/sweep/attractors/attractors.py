@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import attrs
 import numpy as np
 
 from hybrid import arguments
 from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import progress_bar
 from hybrid.kernels.types import codes
+from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names
 from hybrid.solvers import Solver
@@ -18,7 +20,7 @@ from hybrid.status import Status, StatusCode
 from hybrid.sweep.attractors.attractor import Attractors, unaged
 from hybrid.sweep.attractors.runs import CODE, OWNER
 from hybrid.sweep.attractors.search import Search
-from hybrid.sweep.attractors.setup import setup_of
+from hybrid.sweep.attractors.setup import Setup, setup_of
 from hybrid.sweep.attractors.starts import axes_of, sample_of
 from hybrid.sweep.local import cores
 from hybrid.system.elements import Guard
@@ -133,7 +135,11 @@ def attractors(
         rows = search.decided(origins, bar)
         stopped = CTRL_C.is_set()
     found, shown = unaged(search.ordered()[0], setup.system)
-    status = interrupted_status("the attractors found so far") if stopped else status_of_search(rows, periods)
+    status = (
+        interrupted_status("the attractors found so far")
+        if stopped
+        else status_of_search(setup, origins, rows)
+    )
     return Attractors(found, status, Names(shown.state_names, dict(shown.units)))
 
 
@@ -142,8 +148,11 @@ def as_flag(progress: object) -> bool | None:
     return None if progress is None else arguments.flag("progress", progress)
 
 
-def status_of_search(rows: np.ndarray, periods: int) -> Status:
+def status_of_search(setup: Setup, origins: np.ndarray, rows: np.ndarray) -> Status:
     """What a search says of starts that lead to no attractor."""
+    full = _full(setup, origins, rows)
+    if full is not None:
+        return full
     undecided = int(np.sum((rows[:, OWNER] < 0) & (rows[:, CODE] == codes.MAX_STEPS)))
     ended = int(np.sum((rows[:, OWNER] < 0) & (rows[:, CODE] > codes.MAX_STEPS)))
     beyond = int(np.sum(rows[:, CODE] == codes.REFUSED))
@@ -155,7 +164,19 @@ def status_of_search(rows: np.ndarray, periods: int) -> Status:
     if undecided:
         return Status(
             StatusCode.NOT_CONVERGED,
-            f"{undecided} of {len(rows)} starts are near no attractor after {periods} points.",
+            f"{undecided} of {len(rows)} starts are near no attractor after {setup.periods} points.",
             "Raise periods=, or tolerance= where an attractor is a large set.",
         )
     return Status(StatusCode.SUCCESS, " ".join(["Every start is decided.", *told]))
+
+
+def _full(setup: Setup, origins: np.ndarray, rows: np.ndarray) -> Status | None:
+    """The status of a start whose run ended as a delay had no place left; None if there is none."""
+    ended = np.flatnonzero(rows[:, CODE] == codes.NON_FINITE) if setup.system.under_way else ()
+    for i in ended:
+        trajectory = setup.begin(origins[i], setup.mode)
+        code = trajectory.advance(setup.t0 + setup.periods * setup.interval, trajectory.no_record())
+        status = status_of(trajectory, code)
+        if status.code == StatusCode.DELAY_FULL:
+            return attrs.evolve(status, message=f"Of {len(ended)} of {len(rows)} starts: {status.message}")
+    return None

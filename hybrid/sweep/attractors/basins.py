@@ -132,7 +132,9 @@ def basins(
             rows = search.decided(grid.origins, found=rows)
         stopped = CTRL_C.is_set()
     status = (
-        interrupted_status("the lines that were complete") if stopped else status_of_search(rows, periods)
+        interrupted_status("the lines that were complete")
+        if stopped
+        else status_of_search(setup, grid.origins, rows)
     )
     return _dataset(setup, grid, search, rows, status)
 

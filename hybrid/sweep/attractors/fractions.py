@@ -197,7 +197,7 @@ class FractionsAt:
         counts = [int(np.sum(rows[:, OWNER] == i)) for i in range(len(search.found))]
         beyond = int(np.sum(rows[:, CODE] == codes.REFUSED))
         text = written(search, counts, beyond, len(rows))
-        return {"found": text, "status": status_of_search(rows, self.setup.periods)}
+        return {"found": text, "status": status_of_search(search.setup, self.origins, rows)}
 
     def search(self, point: Mapping[str, float]) -> Search:
         """A search at a value of the parameter."""

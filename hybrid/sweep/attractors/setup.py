@@ -68,10 +68,12 @@ class Setup:
     def turns(self) -> np.ndarray:
         """Lengths of a turn ``(n,)``, 0 for components that are no angle.
 
-        That of a counter is 1: two states that differ by a counter are the same place.
+        That of a counter is 1: two states that differ by a counter are the same place, unless it counts what
+        delays have under way.
         """
         system = self.system
-        counts = np.arange(system.dimension) >= system.tangent_dimension
+        others = np.array([name not in system.under_way for name in system.state_names])
+        counts = others & (np.arange(system.dimension) >= system.tangent_dimension)
         return np.where(counts, 1.0, system.turn_lengths)
 
     @property
