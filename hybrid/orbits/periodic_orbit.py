@@ -16,7 +16,7 @@ from hybrid.orbits.newton import Point
 from hybrid.orbits.orbit import PeriodicOrbit, unaged
 from hybrid.orbits.shooting import Shooting
 from hybrid.orbits.undeclared import hinted
-from hybrid.orbits.waits import settled
+from hybrid.orbits.waits import waits_change
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.periods import check_time
 from hybrid.simulation.plan import check_solver
@@ -124,7 +124,7 @@ def periodic_orbit(
         compile_system(system)
         _check_clocks(system, state, parameters, t0, point.period)
         with CTRL_C:
-            shooting, point = settled(shooting, point)
+            shooting, point = _settled(shooting, point)
             return _shown(hinted(shooting, shooting.forced(point, tolerance, max_iterations), point))
     ticking = [each.name for each in system.transitions if each.clock and each.clock.reads_time]
     if ticking:
@@ -139,8 +139,26 @@ def periodic_orbit(
         raise arguments.refusal("period", "be a time that the clock can reach twice", length)
     compile_system(system)
     with CTRL_C:
-        shooting, point = settled(shooting, Point(guess, t0, length))
+        shooting, point = _settled(shooting, Point(guess, t0, length))
         return _shown(hinted(shooting, shooting.autonomous(point, tolerance, max_iterations), point))
+
+
+def _settled(shooting: Shooting, guess: Point) -> tuple[Shooting, Point]:
+    """The search from a point, periods after the guess, from which as many are under way one period later.
+
+    A guess that says nothing of delays has nothing under way. It stays the guess if no such point comes.
+    """
+    system, found, point = shooting.system, shooting, guess
+    for _ in system.under_way:
+        arc = found.follow(point, point.period, found.mode)
+        if not arc.status.ok:
+            break
+        if not waits_change(system, arc):
+            return found, point
+        state, counters = np.split(arc.x[-1], [system.tangent_dimension])
+        found = attrs.evolve(found, mode=str(arc.mode[-1]), counters=counters)
+        point = attrs.evolve(point, x=state)
+    return shooting, guess
 
 
 def _check_clocks(

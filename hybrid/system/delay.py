@@ -12,8 +12,8 @@ from hybrid import arguments
 from hybrid.errors import ModelError
 from hybrid.system.clocks import Clock, Quantity, as_quantity, check_when, in_few_words
 
-# More places than this are taken for a mistake: each is a component of the state.
-MOST_PLACES = 1000
+# Each place is a component of the state, and resets move them all: more would take minutes to compile.
+MOST_PLACES = 100
 
 
 def _as_trigger(value: Any) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from hybrid.system.functions import WholeReset
 from hybrid.system.moving import moving_numbers
 from hybrid.system.places import Places, UnderWay
 from hybrid.system.variables import STATE, Variables, named_values
-from hybrid.system.watched import Watched
+from hybrid.system.watched import Watched, is_of_library
 
 PREFIX = "delay"
 
@@ -50,7 +50,7 @@ class SeenField:
 
 
 @attrs.frozen
-class Change:
+class ListChange:
     """What a jump does to a list: it ``fires`` at a tick of it, or ``begins`` a wait, or both."""
 
     places: Places
@@ -64,7 +64,7 @@ class SeenReset:
 
     reset: Seen | None
     own: tuple[str, ...]
-    changes: tuple[Change, ...]
+    changes: tuple[ListChange, ...]
     components: tuple[str, ...]
 
     def __call__(self, t: Any, x: Any, p: Any) -> Any:
@@ -88,7 +88,24 @@ def marks_alone(transition: Transition) -> bool:
 
 def has_delays(transitions: Sequence[Transition]) -> bool:
     """Whether any transition has a delay that no component of the state stands for yet."""
-    return any(isinstance(each.guard, Delay) for each in transitions)
+    return any(isinstance(getattr(each, "guard", None), Delay) for each in transitions)
+
+
+def check_triggers(transitions: Sequence[Transition]) -> None:
+    """ModelError if a transition that was put into a made system should begin waits, and cannot.
+
+    Resets begin waits. Those of the library do so: they are made of others that do.
+    """
+    named = {each.name: each for each in transitions}
+    for each in transitions:
+        clock = each.guard
+        triggers = clock.delay.trigger if isinstance(clock, UnderWay) else ()
+        for trigger in filter(None, map(named.get, triggers)):
+            if trigger.reset is None or not is_of_library(trigger.reset.function):
+                raise ModelError(
+                    f"Transition {trigger.name!r}: the Delay of {each.name!r} follows it, and it has been "
+                    "put into a system that was made before. Make the system anew with all transitions."
+                )
 
 
 def written_out(system: Any, variables: Variables) -> dict[str, Any]:
@@ -142,9 +159,16 @@ class _Writing:
             "modes": tuple(map(self._mode, system.modes)),
             "transitions": tuple(map(self._transition, self.transitions)),
             "outputs": type(system.outputs)(outputs),
+            "units": {**system.units, **self._units()},
             "under_way": tuple(name for name in self.names if name not in self.author),
             "derived_from": Watched(self._read()).joined(system.derived_from),
         }
+
+    def _units(self) -> dict[str, str]:
+        """The unit of time, of clocks and due times, if it is known."""
+        time = self.system.units.get("t")
+        names = [name for each in self.every for name in (each.clock, *each.due)]
+        return {} if time is None else dict.fromkeys(names, time)
 
     def _read(self) -> Iterator[Any]:
         """What the author wrote, by which values from elsewhere may be read."""
@@ -217,7 +241,8 @@ class _Writing:
         if isinstance(guard, Delay):
             new = UnderWay(guard, self.lists[transition.name], when)
         elif isinstance(guard, Clock):
-            new = guard if when is None else attrs.evolve(guard, when=when)
+            written: Any = guard
+            new = guard if when is None else attrs.evolve(written, when=when)
         else:
             new = attrs.evolve(guard, function=self._seen(guard.function), gradient=None, when=when)
         return attrs.evolve(transition, guard=new, reset=self._reset(transition))
@@ -230,9 +255,8 @@ class _Writing:
             for each in self.transitions
             if each.name == name and isinstance(each.guard, Delay) and transition.name in each.guard.trigger
         }
-        changes = tuple(
-            Change(each, each is own, each in begins) for each in self.every if each is own or each in begins
-        )
+        changed = [each for each in self.every if each is own or each in begins]
+        changes = tuple(ListChange(each, each is own, each in begins) for each in changed)
         if transition.target is None or (transition.reset is None and not changes):
             return None
         reset = None

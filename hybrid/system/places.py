@@ -105,7 +105,8 @@ def _truth(condition: Any) -> Any:
 
 def _place_at_zero(left: Sequence[Any]) -> Any:
     """The first place whose time left is nearest to zero: the one that fires."""
-    place, least = 0.0, abs(left[0])
+    place: Any = 0.0
+    least = abs(left[0])
     for i, each in enumerate(left[1:], 1):
         nearer = abs(each) < least
         place, least = np.where(nearer, float(i), place), np.where(nearer, abs(each), least)
@@ -146,7 +147,7 @@ class UnderWay(Clock):
 
     delay: Delay
     places: Places
-    when: Callable[..., Any] | None  # type: ignore[misc]
+    when: Callable[..., Any] | None
     reads_time: ClassVar[bool] = False
 
     @property

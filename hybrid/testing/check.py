@@ -75,8 +75,9 @@ from hybrid.testing.saltation import (
     check_sum_rule,
 )
 from hybrid.testing.strategies import Ranges, all_laws, cases
-from hybrid.testing.ticks import TICKS, check_ticks
+from hybrid.testing.ticks import check_ticks
 from hybrid.testing.units import UNITS, check_units
+from hybrid.testing.waits import TICKS
 from hybrid.transform.aged import aged
 
 # Properties of the functions, at the start of a case, and of the whole run; laws are others.
