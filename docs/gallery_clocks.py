@@ -7,11 +7,12 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.axes import Axes
 
-from hybrid import simulate
+from hybrid import periodic_orbit, simulate
 from hybrid.plot import COLOURS
 from models import (
     battery_cell,
     boost_converter,
+    delayed_neurons,
     digital_pwm,
     dosing_schedule,
     infusion_schedule,
@@ -94,6 +95,28 @@ def rates_of_the_neuron(axes: Axes) -> None:
     axes.legend(frameon=False)
 
 
+def multipliers_of_the_neurons(axes: Axes) -> None:
+    system = delayed_neurons()
+    drive, weight = system.parameters["I"], system.parameters["eps"]
+    for label, share in (("in phase", 0.0), ("in antiphase", 0.5)):
+        # A pulse comes at the age s of its receiver, whose period is T(s) = (s - tau) / share.
+        s = np.linspace(0.02, 1.1, 200)
+        period = s + np.log((drive * np.exp(-s) - weight) / (drive - 1.0))
+        slope, tau = -weight / (drive * np.exp(-s) - weight), s - share * period
+        exact = (1.0 - slope) ** 2 if share else 1.0 - 2.0 * slope
+        colour = COLOURS[len(axes.lines) // 2]
+        axes.plot(tau[tau > 0.0], exact[tau > 0.0], color=colour, linewidth=0.9, label=label)
+        delays = np.linspace(0.02, 0.26, 7)
+        found = []
+        for delay, length in zip(delays, np.interp(delays, tau, period), strict=True):
+            start = (0.95, drive * (1.0 - np.exp(-share * length)) if share else 0.95)
+            orbit = periodic_orbit(system, start, period=length, parameters={"tau": delay})
+            found.append(orbit.multipliers[1].real)
+        axes.plot(delays, found, "o", color=colour, markersize=3.0)
+    axes.set(xlabel="tau", ylabel="multiplier of a difference", xlim=(0.0, 0.28))
+    axes.legend(frameon=False)
+
+
 def drive_to_the_cut_off(axes: Axes) -> None:
     system = battery_cell()
     p = system.parameters
@@ -114,6 +137,12 @@ PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
         "Current at the ticks over the peak current: a period doubling, borders where ticks find the switch "
         "closed, and chaos.",
         bifurcations_of_the_boost_converter,
+    ),
+    (
+        "delayed_neurons",
+        "Multipliers of two neurons that inhibit each other, computed (dots) and in closed form, over the "
+        "delay of a spike.",
+        multipliers_of_the_neurons,
     ),
     (
         "digital_pwm",

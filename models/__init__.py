@@ -9,6 +9,7 @@ from models.bouncing_table import bouncing_table
 from models.buck_converter import buck_converter
 from models.chua_circuit import chua_circuit
 from models.coulomb_stick_slip import coulomb_stick_slip
+from models.delayed_neurons import delayed_neurons
 from models.digital_pwm import digital_pwm
 from models.dosing_schedule import dosing_schedule
 from models.dry_friction_oscillator import dry_friction_oscillator
@@ -40,6 +41,7 @@ __all__ = [
     "buck_converter",
     "chua_circuit",
     "coulomb_stick_slip",
+    "delayed_neurons",
     "digital_pwm",
     "dosing_schedule",
     "dry_friction_oscillator",

@@ -19,9 +19,9 @@ from hybrid.system.delay import Delay
 
 # The time left where nothing is under way.
 NEVER = 1e300
-# A wait whose end lies behind by more than this share of the duration is over. Whether one that lies behind
-# by less fires, its clock tells, up to rounding.
-OVER = 1e-6
+# A wait is over, and its tick missed, if its end lies behind by more than this share of the duration: the
+# times left are rounded.
+OVER = 1e-9
 
 
 @attrs.frozen
@@ -63,12 +63,10 @@ class Places:
         return [np.where(count > i + 0.5, getattr(x, name) - now, NEVER) for i, name in enumerate(self.due)]
 
     def numbers(self, x: Any, p: Any) -> tuple[Any, ...]:
-        """The time left of each, and one number that is never reached, or tells what is wrong."""
-        last = np.where(getattr(x, self.count) > len(self.due) + 0.5, np.inf, NEVER)
-        if not (self.is_held or isinstance(self.duration, float)):
-            wait = read(self.duration, x, p)
-            last = np.where(wait < 0.0, wait, last)
-        return *self.left(x), last
+        """The times left, and how far a tick may lie behind: a negative or infinite number tells a fault."""
+        wait = self.wait(x, p)
+        late = np.where(wait < 0.0, wait, OVER * wait if self.misses else NEVER)
+        return *self.left(x), np.where(getattr(x, self.count) > len(self.due) + 0.5, np.inf, late)
 
     def fault(self, x: Any, p: Any) -> str:
         """What is wrong with a state that no run leaves, in words; empty if it is right."""

@@ -78,6 +78,10 @@ RUNS = {
             "t_span": (0.0, 7.0),
         },
     ),
+    "delayed_neurons": (
+        models.delayed_neurons(),
+        {"examples": 25, "states": {"v1": (0.0, 0.9), "v2": (0.0, 0.9)}, "t_span": (0.0, 3.5)},
+    ),
     "infusion_schedule": (
         models.infusion_schedule(),
         {"states": {"c": (0.0, 5.0), "r": (0.0, 10.0)}, "t_span": (0.0, 30.0)},

@@ -40,7 +40,7 @@ def begin_of_count(model, run, transition):
 def place_of_tick(model, run, transition, k):
     """Time of tick ``k`` from the start of the current period, in two parts; infinite after the last one."""
     kind, first = model.clock[transition], model.first_tick[transition]
-    count = model.first_tick[transition + 1] - first
+    count = model.first_tick[transition + 1] - first - (kind == UNDER_WAY)
     cycles, high, low, more = -run.cycle, 0.0, 0.0, 0.0
     if kind == EVERY:
         high, low = product_in_two_parts(float(k), run.ticks[first])
@@ -108,6 +108,18 @@ def first_from(model, run, transition, beyond):
         k += 1
 
 
+@njit(**KERNEL)
+def first_under_way(model, run, transition):
+    """The first tick under way that is not missed: what has fired is no longer in the list.
+
+    The last number of the clock tells how far a tick may be behind, since the times left are rounded.
+    """
+    k, late = 0, run.ticks[model.first_tick[transition + 1] - 1]
+    while time_to_tick(model, run, transition, k) < -max(late, rounding_of_tick(model, run, transition, k)):
+        k += 1
+    return k
+
+
 @njit(**INLINE)
 def leads_to_part(model, transition):
     """Whether a transition leads to another part of its mode."""
@@ -148,10 +160,7 @@ def wind(model, run):
         transition = model.clocks[slot]
         own = model.tick_of[transition]
         if model.clock[transition] == UNDER_WAY:
-            # A tick that has fired is no longer in the list.
-            run.tick[own] = 0
-            while is_behind(model, run, transition, run.tick[own]):
-                run.tick[own] += 1
+            run.tick[own] = first_under_way(model, run, transition)
             continue
         if model.clock[transition] >= AFTER:
             begins = entered if model.clock[transition] == AFTER else starts or moved

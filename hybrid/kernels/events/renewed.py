@@ -5,7 +5,7 @@ import math
 from numba import njit
 
 from hybrid.kernels.events.clocks import first_from, is_behind, ticks_now
-from hybrid.kernels.types.codes import AFTER, AT, EVERY, FIRST_TICK, NO_TRANSITION
+from hybrid.kernels.types.codes import AFTER, AT, EVERY, FIRST_TICK, NO_TRANSITION, UNDER_WAY
 from hybrid.kernels.types.options import KERNEL
 
 
@@ -32,7 +32,7 @@ def renew(model, run, scalar):
 @njit(**KERNEL)
 def is_cut_short(model, run, transition, k):
     """Whether a reset at this instant has made a duration shorter than the time that had passed."""
-    may_be = model.moving.shape[0] > 0 and model.clock[transition] >= AFTER
+    may_be = model.moving.shape[0] > 0 and AFTER <= model.clock[transition] < UNDER_WAY
     return may_be and is_behind(model, run, transition, k)
 
 
