@@ -63,7 +63,7 @@ def delayed_neurons() -> HybridSystem:
             Transition("run", "run", Delay("spike 1", "tau"), Reset(_arrive_2), name="arrive 2"),
         ],
         laws=Laws(
-            invariant={"run": {"distances to the threshold": _distances}},
+            invariant={"run": {"1 below the threshold": _distance_1, "2 below the threshold": _distance_2}},
             across={"arrive 1": {"the other stays": _other_stays}},
         ),
     )
@@ -97,8 +97,12 @@ def _arrive_2(t, x, p):
     return {"v2": x.v2 + p.eps}
 
 
-def _distances(t, x, p):
-    return 1.0 - x.v1, 1.0 - x.v2
+def _distance_1(t, x, p):
+    return 1.0 - x.v1
+
+
+def _distance_2(t, x, p):
+    return 1.0 - x.v2
 
 
 def _other_stays(t, minus, plus, p):

@@ -165,10 +165,12 @@ class _Writing:
         }
 
     def _units(self) -> dict[str, str]:
-        """The unit of time, of clocks and due times, if it is known."""
-        time = self.system.units.get("t")
-        names = [name for each in self.every for name in (each.clock, *each.due)]
-        return {} if time is None else dict.fromkeys(names, time)
+        """The units of clocks and due times, and of what counts, if that of time is known."""
+        time, found = self.system.units.get("t"), dict[str, str]()
+        for each in self.every if time is not None else ():
+            found |= dict.fromkeys((each.clock, *each.due), str(time))
+            found |= dict.fromkeys((each.count, each.busy), "1")
+        return found
 
     def _read(self) -> Iterator[Any]:
         """What the author wrote, by which values from elsewhere may be read."""

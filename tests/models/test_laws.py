@@ -179,6 +179,7 @@ MORE_UNCHECKED = {
     "bouncing_table": {CUT},
     "buck_converter": {CUT, SUM_RULE},
     "boost_converter": {CUT, SUM_RULE},
+    "delayed_neurons": {CUT},
     "dosing_schedule": TIMED,
     "infusion_schedule": TIMED,
     "sampled_loop": {*TIMED, SUM_RULE},
