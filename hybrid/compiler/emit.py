@@ -46,7 +46,7 @@ from hybrid.compiler.told import told, where_it_jumps
 from hybrid.compiler.traced import Traces, expressions_of, period_of
 from hybrid.compiler.written import Written, beyond_guards, called, item, variational
 from hybrid.errors import ModelError
-from hybrid.expression.continuity import jumps_of, may_be_abrupt
+from hybrid.expression.continuity import has_jumps, may_be_abrupt
 from hybrid.expression.derivatives import jacobian_of
 from hybrid.expression.graph import forget, nodes_of
 from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol
@@ -233,7 +233,7 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
         read_by=readers(system, fields, guards, conditions, resets, symbols),
         keeps_state=tuple(reset.expressions == [*symbols.x] for reset in resets),
         jumping_reset=tuple(
-            reset.expressions is None or bool(jumps_of(reset.expressions, (symbols.t, *symbols.x)))
+            reset.expressions is None or has_jumps(reset.expressions, (symbols.t, *symbols.x))
             for reset in resets
         ),
         propagators=tuple(map(_without_code, propagators)),

@@ -83,15 +83,20 @@ def jumps_of(field: Iterable[Expression], states: Sequence[Symbol]) -> list[str]
     return [*found]
 
 
-def _surfaces(entry: Expression, states: Sequence[Symbol]) -> list[str]:
+def has_jumps(field: Iterable[Expression], states: Sequence[Symbol]) -> bool:
+    """Whether a field is not proved continuous in the states; the first surface that is found decides."""
+    return any(True for entry in field for _ in _surfaces(entry, states))
+
+
+def _surfaces(entry: Expression, states: Sequence[Symbol]) -> Iterator[str]:
     if not contains(entry, (*JUMPS, Tabulated, WholeQuotient)):
-        return []
+        return
     floors = nodes_of((WholeQuotient, Round), entry)
     entry = replaced(entry, {each: each.in_other_terms(*each.args) for each in floors})
     jumps = (node for node in nodes_of((*JUMPS, Tabulated), entry) if moves(node, states) and _may_jump(node))
     atoms = sorted(jumps, key=order_of)
     names = {atom: Symbol(f"jump {i}") for i, atom in enumerate(atoms)}
-    return [_told(atom) for atom in atoms if not _is_continuous(entry, atom, names)]
+    yield from (_told(atom) for atom in atoms if not _is_continuous(entry, atom, names))
 
 
 def _may_jump(atom: Expression) -> bool:

@@ -86,7 +86,8 @@ class Places:
         """The components after a jump at ``x``, which ``fires`` at a tick, or ``begins`` a wait, or both."""
         left, count = self.left(x), getattr(x, self.count)
         if self.misses:
-            gone = _place_at_zero(left) + 1.0 if fires else sum(_truth(each < -OVER * wait) for each in left)
+            # Those that are over come first, then the one that fires.
+            gone = sum([_truth(each < -OVER * wait) for each in left], float(fires))
             left, count = _without(left, gone), count - gone
         elif fires:
             left, count = [*left[1:], NEVER], count - 1.0
@@ -99,16 +100,6 @@ class Places:
 def _truth(condition: Any) -> Any:
     """1 where a condition holds, else 0."""
     return np.where(condition, 1.0, 0.0)
-
-
-def _place_at_zero(left: Sequence[Any]) -> Any:
-    """The first place whose time left is nearest to zero: the one that fires."""
-    place: Any = 0.0
-    least = abs(left[0])
-    for i, each in enumerate(left[1:], 1):
-        nearer = abs(each) < least
-        place, least = np.where(nearer, float(i), place), np.where(nearer, abs(each), least)
-    return place
 
 
 def _without(left: Sequence[Any], gone: Any) -> list[Any]:
@@ -178,11 +169,11 @@ class UnderWay(Clock):
         return self.places.numbers(x, p)
 
     def _since_tick(self, t: Any, numbers: Sequence[Any]) -> Any:
-        """The time since the tick that is nearest, negative before it."""
-        left, *others = numbers[:-1]
-        for each in others if self.places.misses else ():
-            left = np.where(abs(each) < abs(left), each, left)
-        return -left
+        """The time since the first tick that is not over, negative before it."""
+        *left, late = numbers
+        if not self.places.misses:
+            return -left[0]
+        return -reduce(lambda found, each: np.where(each < -late, found, each), reversed(left))
 
     def _fault(self, numbers: Sequence[float], moving: bool = False) -> str:
         """What is wrong with the numbers."""
