@@ -34,6 +34,7 @@ DEFAULTS = {
     hybrid.Every: {"offset": 0.0, "when": None},
     hybrid.At: {"when": None, "unit": None, "origin": None, "columns": None},
     hybrid.After: {"when": None, "restarts": True},
+    hybrid.Delay: {"places": 8, "when": None},
     hybrid.Guard: {"direction": 0, "gradient": None, "when": None, "at_start": False},
     hybrid.Mode: {"jacobian": None, "part_of": None},
     hybrid.Reset: {"jacobian": None},
@@ -48,6 +49,7 @@ DEFAULTS = {
         "period": None,
         "name": "",
         "notes": (),
+        "under_way": (),
         "growth": None,
     },
     hybrid.Answer: {
