@@ -54,6 +54,7 @@ from hybrid.system.delay import Delay
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.system.laws import Laws
+from hybrid.system.repeat import repeat
 from hybrid.system.schedule import At
 from hybrid.transform.filippov import filippov
 from hybrid.transform.split import from_equations, split
@@ -122,6 +123,7 @@ __all__ = [
     "open_store",
     "periodic_orbit",
     "poincare_section",
+    "repeat",
     "saltation_matrix",
     "simulate",
     "simulate_many",

@@ -18,9 +18,10 @@ from hybrid.expression.tabulated import Tabulated
 from hybrid.expression.text import text
 from hybrid.expression.ufuncs import RULES
 from hybrid.expression.values import Traced as Traced
+from hybrid.expression.values import TracedArray, values_of
 from hybrid.expression.values import TraceError as TraceError
-from hybrid.expression.values import values_of
 from hybrid.expression.vocabulary import NEEDS_TABLE
+from hybrid.system.grouped import ARRAYS
 
 # Largest number of operations of an expression shown in an error text.
 SHOWN = 100
@@ -61,6 +62,8 @@ def _told(error: Exception) -> str:
 
 
 SYMBOLIC = SymbolicAlgebra()
+# Of the values of all members of a repeat, as in x.cell.soc.
+ARRAYS[Traced] = TracedArray
 # The row of a schedule that fires.
 ROW = Symbol("row")
 

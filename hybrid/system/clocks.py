@@ -11,6 +11,7 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.errors import ModelError, shown
+from hybrid.system.members import is_component_name
 from hybrid.system.portable import Portable
 
 # A number, the name of a parameter or of what resets alone change, or a function of ``p``, which has both.
@@ -19,7 +20,7 @@ Quantity = Any
 
 def as_quantity(kind: str, name: str, value: Any) -> Quantity:
     """A quantity as the user gave it, checked as far as it can be without parameters."""
-    if callable(value) or (isinstance(value, str) and value.isidentifier()):
+    if callable(value) or is_component_name(value):
         return value
     number = None if isinstance(value, bool | str) else arguments.floats(value)
     if number is None or number.shape != () or not math.isfinite(number):

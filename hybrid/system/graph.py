@@ -16,6 +16,7 @@ from hybrid.system.checks import check_angles, check_functions
 from hybrid.system.delayed import check_triggers, has_delays, written_out
 from hybrid.system.described import described, described_in_html
 from hybrid.system.elements import END, Mode, Transition
+from hybrid.system.expansion import as_repeats, expanded
 from hybrid.system.functions import ModelFunction, functions_in
 from hybrid.system.given import (
     as_listed_order,
@@ -35,6 +36,7 @@ from hybrid.system.moving import moving_numbers
 from hybrid.system.outputs import Output, as_outputs, check_outputs
 from hybrid.system.periodicity import Period, period_at
 from hybrid.system.portable import Portable
+from hybrid.system.repeat import Repeat
 from hybrid.system.switching import switching_inside
 from hybrid.system.variables import Variables, as_counters, as_held, as_parameters, as_state
 from hybrid.system.watched import Watched
@@ -78,6 +80,10 @@ class HybridSystem(Portable):
         ``t``, which is checked. Time is then stored as a number of whole periods and a phase.
     name
         For reports and figures.
+    repeats
+        Many of a kind, from `repeat`: their members become ordinary components, parameters and transitions
+        when the system is made, behind those given here; a field given here returns the rates of ``state``
+        alone. The attribute is empty afterwards: names such as ``cell[3].soc`` tell the members.
     units
         Units by name, of components of the state, of parameters, of outputs, and of time under the name
         ``"t"``; any may be left out. Results as datasets and pictures show them, and `hybrid.testing` checks
@@ -145,7 +151,7 @@ class HybridSystem(Portable):
     (10.0, 3, (2, 2))
     """
 
-    state: tuple[str, ...] | int = attrs.field(kw_only=True, converter=as_state)
+    state: tuple[str, ...] | int = attrs.field(default=(), kw_only=True, converter=as_state)
     held: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=as_held)
     counters: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=as_counters)
     parameters: Mapping[str, float] = attrs.field(factory=dict, kw_only=True, converter=as_parameters)
@@ -164,6 +170,9 @@ class HybridSystem(Portable):
         factory=dict, kw_only=True, converter=as_outputs, eq=False, repr=False
     )
     laws: Laws = attrs.field(factory=Laws, kw_only=True, eq=False, repr=False, validator=check_laws)
+    repeats: tuple[Repeat, ...] = attrs.field(
+        default=(), kw_only=True, converter=as_repeats, eq=False, repr=False
+    )
     # Lines for `repr`: what short names in a derived system stand for.
     notes: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=as_notes, repr=False)
     # Components that hold what delays have under way, which no author names.
@@ -182,6 +191,11 @@ class HybridSystem(Portable):
     _made_by: Any = attrs.field(default=None, init=False, repr=False)
 
     def __attrs_post_init__(self) -> None:
+        if self.repeats:
+            for name, value in {**expanded(self), "repeats": ()}.items():
+                object.__setattr__(self, name, value)
+        if not self.state:
+            raise ModelError("HybridSystem: state needs at least one component; got an empty sequence.")
         if has_delays(self.transitions):
             self._write_out_delays()
         elif self.under_way:

@@ -91,8 +91,10 @@ def function_in(what: Function | Output, *names: str | None) -> Function | None:
     return what.in_mode(*names) if isinstance(what, Output) else what
 
 
-def as_outputs(value: Any) -> Mapping[str, Output]:
+def as_outputs(value: Any, owner: str = "HybridSystem") -> Mapping[str, Output]:
     """Outputs by name, read-only, from functions of ``(t, x, p)`` or mappings of modes to such functions.
+
+    ``owner`` begins error texts.
 
     Raises
     ------
@@ -100,16 +102,17 @@ def as_outputs(value: Any) -> Mapping[str, Output]:
         If a name is no text, or an output has no function.
     """
     found = {}
-    for name, given in named("HybridSystem: outputs", value, BY_NAME).items():
+    for name, given in named(f"{owner}: outputs", value, BY_NAME).items():
         if not isinstance(name, str) or not name:
-            raise arguments.refusal("HybridSystem: outputs: a name", "be a non-empty text", name)
-        formulas = given.formulas if isinstance(given, Output) else _formulas(name, given)
+            raise arguments.refusal(f"{owner}: outputs: a name", "be a non-empty text", name)
+        formulas = (
+            given.formulas if isinstance(given, Output) else _formulas(f"{owner}: outputs[{name!r}]", given)
+        )
         found[name] = Output(name, formulas)
     return FrozenMapping(found)
 
 
-def _formulas(name: str, given: Any) -> tuple[Formula, ...]:
-    title = f"HybridSystem: outputs[{name!r}]"
+def _formulas(title: str, given: Any) -> tuple[Formula, ...]:
     if callable(given):
         return (Formula(None, given),)
     if not isinstance(given, Mapping):

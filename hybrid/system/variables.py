@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import keyword
 from collections import namedtuple
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property, lru_cache
@@ -15,7 +14,9 @@ import numpy as np
 from hybrid import arguments
 from hybrid.errors import ArgumentError, ModelError, unknown_name
 from hybrid.system.frozen import FrozenMapping
+from hybrid.system.grouped import UnknownComponentError, grouped_class
 from hybrid.system.labels import by_label, named, plain_name
+from hybrid.system.members import is_component_name, member_name, spread
 
 STATE = "State components"
 PARAMETERS = "Parameters"
@@ -26,10 +27,6 @@ MOST_COMPONENTS = 1_000_000
 MOST_CLASSES = 256
 
 
-class UnknownComponentError(ModelError, AttributeError):
-    """A model function asked for a state or a parameter that the system does not have."""
-
-
 @lru_cache(MOST_CLASSES)
 def plain_class(kind: str, names: tuple[str, ...]) -> type[Any]:
     """A plain namedtuple class with the given fields, which compiled code supports."""
@@ -38,6 +35,9 @@ def plain_class(kind: str, names: tuple[str, ...]) -> type[Any]:
 
 @lru_cache(MOST_CLASSES)
 def _explaining_class(kind: str, names: tuple[str, ...]) -> type[Any]:
+    if any(map(member_name, names)):
+        return grouped_class(kind, LETTERS.get(kind, "x"), names, _explaining_class)
+
     def __getattr__(self: Any, name: str) -> Any:
         raise UnknownComponentError(unknown_name(kind.removesuffix("s"), name, names, kind))
 
@@ -114,12 +114,21 @@ class Variables:
         owner: dict[str, str] = {}
         for kind, names in kinds.items():
             for name in names:
-                other = owner.setdefault(name, kind)
-                if other != kind:
-                    raise ModelError(
-                        f"HybridSystem: {name!r} is the name of {other} and of {kind}. A name means one "
-                        "thing; rename one of the two."
-                    )
+                self._check_owner(owner, name, kind)
+        for name in [*owner]:
+            member = member_name(name)
+            if member is not None:
+                self._check_owner(owner, member.group, "a repeat")
+
+    @staticmethod
+    def _check_owner(owner: dict[str, str], name: str, kind: str) -> None:
+        """ModelError if a name is that of another kind already."""
+        other = owner.setdefault(name, kind)
+        if other != kind:
+            raise ModelError(
+                f"HybridSystem: {name!r} is the name of {other} and of {kind}. A name means one "
+                "thing; rename one of the two."
+            )
 
     @cached_property
     def moving(self) -> int:
@@ -162,25 +171,27 @@ class Variables:
     def parameter_values(self, overrides: Mapping[str, float] | None = None) -> np.ndarray:
         """Parameter vector ``(m,)`` with the overrides applied; unknown names raise an ArgumentError."""
         values, names = self.defaults.copy(), self.parameter_names
-        for name, number in named("parameters", overrides).items():
+        given = spread("parameters", named("parameters", overrides), names)
+        for name, number in given.items():
             arguments.known("parameters: Parameter", name, names, "Parameters")
             values[names.index(name)] = arguments.number(f"parameters: Parameter {name!r}", number)
         return values
 
     def as_units(self, value: object, outputs: Iterable[str] = ()) -> Mapping[str, str]:
         """Units by name of a component, of a parameter, of an output or of the time ``t``, read-only."""
-        given = named("HybridSystem: units", value, "map names to texts")
+        title, names = "HybridSystem: units", (*self.state_names, *self.parameter_names, *outputs, "t")
+        given = spread(title, named(title, value, "map names to texts"), names)
         for name, unit in given.items():
-            names = [*self.state_names, *self.parameter_names, *outputs, "t"]
             arguments.known("HybridSystem: units: Name", name, names, "Names")
             arguments.instance(f"HybridSystem: units[{name!r}]", unit, str)
         return FrozenMapping(given)
 
     def as_angles(self, value: object) -> Mapping[str, float]:
         """Lengths of a turn by name of a component, read-only."""
-        given = named("HybridSystem: angles", value, "map names of the state to lengths of a turn")
+        title, names = "HybridSystem: angles", self.state_names
+        given = spread(title, named(title, value, "map names of the state to lengths of a turn"), names)
         for name, turn in given.items():
-            arguments.known("HybridSystem: angles: State component", name, self.state_names, STATE)
+            arguments.known("HybridSystem: angles: State component", name, names, STATE)
             given[name] = arguments.positive(f"HybridSystem: angles[{name!r}]", turn)
         return FrozenMapping(given)
 
@@ -255,6 +266,7 @@ class Variables:
         given = by_label(name, value)
         if given is None:
             return None
+        given = spread(name, given, self.state_names)
         for component in given:
             arguments.known(f"{name}: State component", component, self.state_names, "State components")
         given = dict.fromkeys((*self.state_names[self.moving :], *self.under_way), 0.0) | given
@@ -314,8 +326,6 @@ def as_state(value: Any) -> tuple[str, ...] | int:
     if not isinstance(value, Sequence) and not (isinstance(value, np.ndarray) and value.ndim == 1):
         raise arguments.refusal("HybridSystem: state", "be a tuple of names or a number of components", value)
     names = tuple(map(plain_name, value))
-    if not names:
-        raise ModelError("HybridSystem: state needs at least one component; got an empty sequence.")
     _check_identifiers(names, "state")
     return names
 
@@ -351,7 +361,7 @@ def as_parameters(value: Any) -> Mapping[str, float]:
 
 def _check_identifiers(names: tuple[str, ...], kind: str) -> None:
     for name in names:
-        if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name) or name[0] == "_":
+        if not is_component_name(name):
             raise ModelError(
                 f"HybridSystem: {kind} name {arguments.shown(name)} cannot be written as an attribute. Use a "
                 "Python identifier that is not a keyword and does not begin with an underscore."

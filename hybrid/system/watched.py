@@ -25,6 +25,20 @@ PLAIN = {bool, int, float, complex, str, bytes, np.float64, np.int64, np.bool_}
 MISSING = object()
 
 
+class Wrapper:
+    """Base of the library's functions that call functions of the user's: they read what these read."""
+
+    __slots__ = ()
+
+    @property
+    def called(self) -> tuple[Callable[..., Any], ...]:
+        """The user's functions."""
+        raise NotImplementedError
+
+
+CALLABLE = FunctionType | MethodType | functools.partial | Wrapper
+
+
 class Watched:
     """Values that were read, each with the place where it was read.
 
@@ -92,6 +106,9 @@ class Watched:
                 self._read(value, frozenset())
         elif isinstance(function, MethodType):
             self._read_by(function.__func__, function.__self__)
+        elif isinstance(function, Wrapper):
+            for each in function.called:
+                self._read_by(each)
         elif isinstance(function, FunctionType):
             self._read_by_code(function, owner)
         elif isinstance(getattr(function, "py_func", None), FunctionType):
@@ -140,7 +157,7 @@ class Watched:
         elif isinstance(value, ModuleType):
             if not _is_library(value):
                 self._read_attributes(value, attributes)
-        elif isinstance(value, FunctionType | MethodType | functools.partial) or hasattr(value, "py_func"):
+        elif isinstance(value, CALLABLE) or hasattr(value, "py_func"):
             self._read_by(value)
         else:
             self._read_object(value, attributes)
@@ -187,6 +204,8 @@ def _names_in(code: CodeType) -> tuple[frozenset[str], frozenset[str]]:
 
 def is_of_library(function: Any) -> bool:
     """Whether a function is the library's own, as those are that it derives."""
+    if isinstance(function, Wrapper):
+        return all(map(is_of_library, function.called))
     code = getattr(function, "__code__", getattr(type(function).__call__, "__code__", None))
     return code is not None and Path(code.co_filename).is_relative_to(LIBRARY)
 

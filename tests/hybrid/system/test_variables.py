@@ -111,7 +111,6 @@ class TestNamesAndNumbers:
             (0, "HybridSystem: state needs at least one component; got 0."),
             (-1, "HybridSystem: state needs at least one component; got -1."),
             (MOST_COMPONENTS + 1, f"HybridSystem: state has at most {MOST_COMPONENTS} components; got "),
-            ((), "HybridSystem: state needs at least one component; got an empty sequence."),
             ("q", "HybridSystem: state must be a tuple of names or a number of components; got 'q'. Write"),
             (True, "HybridSystem: state must be a tuple of names or a number of components; got True."),
             (2.0, "HybridSystem: state must be a tuple of names or a number of components; got 2.0"),

@@ -1,0 +1,209 @@
+"""The members of repeats as ordinary components, parameters, transitions and outputs of a system."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+import attrs
+
+from hybrid import arguments
+from hybrid.errors import ModelError, unknown_name
+from hybrid.system.clocks import Clock
+from hybrid.system.elements import Guard, Mode, Reset, Transition
+from hybrid.system.frozen import FrozenMapping
+from hybrid.system.laws import Law, Laws
+from hybrid.system.member_functions import JoinedField, MemberFunction, MemberReset, Part
+from hybrid.system.members import full_name, member_name
+from hybrid.system.outputs import Output
+from hybrid.system.repeat import Repeat
+
+
+def as_repeats(value: Iterable[Repeat]) -> tuple[Repeat, ...]:
+    """The repeats as a tuple."""
+    found = arguments.items("HybridSystem: repeats", value, "be a list of what hybrid.repeat returns")
+    for each in found:
+        arguments.instance("HybridSystem: each repeat", each, Repeat, "Make one with hybrid.repeat.")
+    return tuple(found)
+
+
+def expanded(system: Any) -> dict[str, Any]:
+    """The fields of a :class:`hybrid.HybridSystem` with the members of its repeats in them, by name.
+
+    Raises
+    ------
+    ModelError
+        If a name is taken, the state has no names, a field lacks a mode, or a mode gives its derivative.
+    """
+    repeats = system.repeats
+    _check(system)
+    members = [(each, i) for each in repeats for i in range(each.count)]
+
+    def names(kind: str) -> tuple[str, ...]:
+        own = getattr(system, kind)
+        return (*own, *(full_name(r.name, i, name) for r, i in members for name in getattr(r, kind)))
+
+    def mapping(kind: str) -> dict[str, Any]:
+        own = dict(getattr(system, kind))
+        return own | {
+            full_name(r.name, i, name): each for r, i in members for name, each in getattr(r, kind).items()
+        }
+
+    parameters = dict(system.parameters)
+    for each, i in members:
+        parameters |= {full_name(each.name, i, name): v[i] for name, v in each.parameters.items()}
+    laws = system.laws
+    for each, i in members:
+        laws = laws.joined(_laws(each, i))
+    return {
+        "state": names("state"),
+        "held": names("held"),
+        "counters": names("counters"),
+        "parameters": FrozenMapping(parameters),
+        "modes": tuple(_mode(system, mode) for mode in system.modes),
+        "transitions": (*system.transitions, *(t for each, i in members for t in _transitions(each, i))),
+        "units": mapping("units"),
+        "angles": mapping("angles"),
+        "outputs": FrozenMapping(dict(system.outputs) | _outputs(members)),
+        "laws": laws,
+    }
+
+
+def _check(system: Any) -> None:
+    if isinstance(system.state, int):
+        raise ModelError(
+            f"HybridSystem: repeats= needs a state with names; got state={system.state}. Name its "
+            "components, or leave them out: state=()."
+        )
+    own = (*system.state, *system.held, *system.counters)
+    taken = {*own, *system.parameters, *system.outputs}
+    taken |= {parts.group for name in [*taken] if (parts := member_name(name))}
+    for repeated in system.repeats:
+        if repeated.name in taken:
+            raise ModelError(
+                f"HybridSystem: repeat {repeated.name!r}: the name is taken by a component, a parameter, an "
+                "output or another repeat. A name means one thing; rename one of the two."
+            )
+        taken.add(repeated.name)
+        shared = [name for name in repeated.components if name in own]
+        if shared:
+            raise ModelError(
+                f"HybridSystem: repeat {repeated.name!r}: {shared[0]!r} is a component of each member and of "
+                "the system, so a reset of a member could not tell which one it changes. Rename one of them."
+            )
+    _check_modes(system)
+
+
+def _check_modes(system: Any) -> None:
+    modes = [mode.name for mode in system.modes if isinstance(mode, Mode)]
+    for mode in system.modes:
+        if isinstance(mode, Mode) and mode.jacobian is not None:
+            raise ModelError(
+                f"Mode {mode.name!r}: jacobian= cannot be given in a system with repeats, whose members "
+                "it lacks. Omit it: the library derives it."
+            )
+    for repeated in system.repeats:
+        if not isinstance(repeated.field, Mapping):
+            continue
+        title = f"repeat {repeated.name!r}: field"
+        for name in repeated.field:
+            if name not in modes:
+                raise ModelError(unknown_name(f"{title}: mode", name, modes, "Modes"))
+        missing = [name for name in modes if name not in repeated.field]
+        if missing:
+            raise ModelError(f"{title} lacks the mode {missing[0]!r}. Give a function for each mode.")
+
+
+def _mode(system: Any, mode: Any) -> Any:
+    """The mode with the rates of the members; what is no mode is refused later."""
+    if not isinstance(mode, Mode):
+        return mode
+    parts = []
+    for each in system.repeats:
+        function = each.field[mode.name] if isinstance(each.field, Mapping) else each.field
+        if function is not None:
+            parts.append(Part(each.name, each.count, each.state, function))
+    return attrs.evolve(mode, field=JoinedField(mode.field, system.state, tuple(parts)))
+
+
+def _transitions(repeated: Repeat, i: int) -> Iterator[Transition]:
+    """The transitions of a member."""
+
+    def own(function: Callable[..., Any] | None) -> MemberFunction | None:
+        return None if function is None else MemberFunction(function, i)
+
+    for each in repeated.transitions:
+        guard, reset = each.guard, each.reset
+        if isinstance(guard, Guard):
+            changed = {"gradient": own(guard.gradient), "when": own(guard.when)}
+            guard = attrs.evolve(guard, function=own(guard.function), **changed)
+        else:
+            guard = _clock(repeated, i, guard)
+        if reset is not None:
+            function = MemberReset(reset.function, repeated.name, i, repeated.components)
+            reset = Reset(function, jacobian=own(reset.jacobian))
+        name = full_name(repeated.name, i, each.name)
+        yield attrs.evolve(each, guard=guard, reset=reset, name=name)
+
+
+def _clock(repeated: Repeat, i: int, clock: Clock) -> Clock:
+    """A clock with the numbers of a member."""
+
+    def own(quantity: Any) -> Any:
+        if isinstance(quantity, str):
+            known = (*repeated.parameters, *repeated.held, *repeated.counters, *repeated.state)
+            return _own_name(repeated, i, quantity, known)
+        return MemberFunction(quantity, i) if callable(quantity) else quantity
+
+    fields = [field.name for field in attrs.fields(type(clock)) if field.init]
+    changed = {}
+    for name in fields:
+        value = getattr(clock, name)
+        changed[name] = tuple(map(own, value)) if isinstance(value, tuple) else own(value)
+    return attrs.evolve(clock, **changed)
+
+
+def _outputs(members: Iterable[tuple[Repeat, int]]) -> dict[str, Output]:
+    found = {}
+    for each, i in members:
+        for name, output in each.outputs.items():
+            own = output.changed(lambda function, i=i: MemberFunction(function, i))
+            full = full_name(each.name, i, name)
+            found[full] = attrs.evolve(own, name=full)
+    return found
+
+
+def _laws(repeated: Repeat, i: int) -> Laws:
+    """The laws of a member, by full names."""
+    known, transitions = (*repeated.components, *repeated.outputs), [t.name for t in repeated.transitions]
+    laws = repeated.laws
+
+    def own(quantity: Any) -> Any:
+        if isinstance(quantity, str):
+            return _own_name(repeated, i, quantity, known)
+        return MemberFunction(quantity, i) if callable(quantity) else quantity
+
+    def law(each: Law) -> Law:
+        name = full_name(repeated.name, i, each.name)
+        return Law(name, each.of, own(each.quantity), own(each.flow))
+
+    elastic = laws.elastic
+    if callable(elastic):
+        raise ModelError(
+            f"repeat {repeated.name!r}: laws: elastic must be names of components of a member; got a "
+            "function. An involution of the whole state belongs to the laws of the system."
+        )
+    return Laws(
+        **{kind: tuple(map(law, some)) for kind, some in laws.in_modes.items()},
+        continuous=tuple(_own_name(repeated, i, name, transitions) for name in laws.continuous),
+        across=tuple(
+            attrs.evolve(law(each), of=_own_name(repeated, i, str(each.of), transitions))
+            for each in laws.across
+        ),
+        elastic=None if elastic is None else tuple(_own_name(repeated, i, name, known) for name in elastic),
+    )
+
+
+def _own_name(repeated: Repeat, i: int, name: str, known: Iterable[str]) -> str:
+    """The full name of what a member calls ``name``; that of the system otherwise."""
+    return full_name(repeated.name, i, name) if name in known else name
