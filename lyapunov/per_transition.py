@@ -7,6 +7,7 @@ import numpy as np
 
 from hybrid import ArgumentError, HybridSystem, arguments
 from hybrid.accuracy.averages import Array, standard_error_from_batches, taper_inflation
+from hybrid.system.members import shared_name
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -54,15 +55,21 @@ class JumpRates:
         parts = tuple(each.part_of for each in system.transitions)
         return cls(system.transition_names, parts, k, means, batches)
 
+    @property
+    def shared(self) -> tuple[str, ...]:
+        """By transition the name for those of all members of a repeat, or its own."""
+        pairs = zip(self.names, self.part_of, strict=True)
+        return tuple(shared_name(part_of or name) for name, part_of in pairs)
+
     def per(self, transition: str) -> PerTransition:
-        r"""Exponents per jump of a transition, and its copies where it has been split.
+        r"""Exponents per jump of a transition, and its copies where it has been split or repeated.
 
         The ratio of the means, with the error of :math:`g - r n`: growth and number of jumps of an interval
         belong together (the error of a ratio to first order).
         """
-        known = dict.fromkeys([*self.names, *filter(None, self.part_of)])
+        known = dict.fromkeys([*self.names, *filter(None, self.part_of), *self.shared])
         arguments.known("transition: Transition", transition, known, "Transitions")
-        own = [transition in pair for pair in zip(self.names, self.part_of, strict=True)]
+        own = [transition in each for each in zip(self.names, self.part_of, self.shared, strict=True)]
         columns = self.k + 1 + np.flatnonzero(own)
         rate = float(self.means[columns].sum())
         if not rate > 0.0:

@@ -418,11 +418,11 @@ class _Writer:
         for name, known in self.opaque.items():
             if known.function is called and known.shape == shape:
                 return name
-        check_plain(title, called)
         name, names, why = f"model_{len(self.opaque)}", tuple(self.system.parameters), str(reason).rstrip(".")
         opaque = OpaqueFunction(
             title, called, why, self.system.variables.components, names, shape, completed=completed
         )
+        check_plain(title, called)
         self.opaque[name] = opaque
         return name
 

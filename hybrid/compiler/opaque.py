@@ -17,6 +17,7 @@ from hybrid.errors import ModelError
 from hybrid.system.derivatives import COMPLEX_STEP
 from hybrid.system.functions import checked_changes
 from hybrid.system.labels import plain_name
+from hybrid.system.members import member_name
 from hybrid.system.variables import PARAMETERS, STATE, plain_class
 
 LONGEST_REASON = 300
@@ -57,6 +58,14 @@ class OpaqueFunction:
     shape: tuple[int, ...]
     slopes: bool = False
     completed: bool = False
+
+    def __attrs_post_init__(self) -> None:
+        components = () if isinstance(self.state, int) else self.state
+        if any(map(member_name, (*components, *self.parameters))):
+            raise ModelError(
+                f"{self.title} cannot be traced, as the functions of a system with repeats must be: "
+                f"{self.reason}. Write it with NumPy functions on numbers (np.sin, np.maximum, np.where)."
+            )
 
     @property
     def size(self) -> int:

@@ -8,11 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybrid import arguments
-from hybrid.plot.style import Rows, axes_for, colour_of, legend, named_quantity, plain
+from hybrid.plot.style import (
+    Rows,
+    axes_for,
+    colour_of,
+    legend,
+    member_colours,
+    member_legend,
+    named_quantity,
+    plain,
+)
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.labelled import Names
-from hybrid.simulation.quantities import table_of
+from hybrid.simulation.quantities import members, table_of
 from hybrid.system.graph import HybridSystem
+from hybrid.system.members import condensed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,12 +42,15 @@ def plot_arc(
 ) -> Rows:
     """Draw an arc over time: one row per component or output, one colour per mode, dotted lines for resets.
 
+    The members of a repeat share a row, with one colour per member.
+
     Parameters
     ----------
     arc
         From :func:`hybrid.simulate`; its dense output, if it has one, refines the curves between the steps.
     components
-        Names or indices of the state's components, or names of outputs; by default all components.
+        Names or indices of the state's components, or names of outputs; by default all components. A name
+        such as ``cell.soc`` draws those of all members.
     ax
         Axes to draw into, one per row; by default those of a new figure.
     figsize
@@ -63,18 +76,26 @@ def plot_arc(
     ('t (s)', 'q (m)')
     """
     system = _as_arc(arc).system
-    chosen = list(system.own_names) if components is None else _names(system, components)
+    chosen = list(condensed(system.own_names)) if components is None else _names(system, components)
     axes = axes_for(ax, len(chosen), figsize=figsize)
     labels = Names(system.state_names, system.units)
-    lines = curves(arc, chosen)
-    for i, (row, name) in enumerate(zip(axes, chosen, strict=True)):
-        for mode, (t, values) in lines.items():
-            row.plot(t, values[:, i], color=colour_of(mode), linewidth=1.4, solid_capstyle="round")
-        if arc.keeps_jumps:
-            t, ends = np.repeat(arc.jumps.t, 3), _over_jumps(arc, name)
-            row.plot(t, ends, color=JUMP_COLOUR, linewidth=0.9, linestyle=":", zorder=1)
+    drawn = [members(name, system) or (name,) for name in chosen]
+    columns = [name for names in drawn for name in names]
+    lines = curves(arc, columns)
+    for row, name, names in zip(axes, chosen, drawn, strict=True):
+        shades = member_colours(len(names))
+        for k, one in enumerate(names):
+            for mode, (t, values) in lines.items():
+                colour = colour_of(mode) if one == name else shades[k]
+                found = values[:, columns.index(one)]
+                row.plot(t, found, color=colour, linewidth=1.4, solid_capstyle="round")
+            if arc.keeps_jumps:
+                t, ends = np.repeat(arc.jumps.t, 3), _over_jumps(arc, one)
+                row.plot(t, ends, color=JUMP_COLOUR, linewidth=0.9, linestyle=":", zorder=1)
+        if name not in names:
+            member_legend(row, names, shades)
         _shade(row, lines)
-        row.set_ylabel(labels.label(name))
+        row.set_ylabel(labels.label(names[0]).replace(names[0], name))
         row.margins(x=0)
         plain(row)
     if len(axes):
@@ -150,7 +171,9 @@ def _as_arc(arc: object) -> HybridArc:
 def _names(system: HybridSystem, components: object) -> list[str]:
     wanted = "be names or indices of components of the state, or names of outputs, at least one"
     given = arguments.items("components", components, wanted, least=1)
-    return [named_quantity("components", system, each) for each in given]
+    return [
+        str(each) if members(each, system) else named_quantity("components", system, each) for each in given
+    ]
 
 
 def curves(arc: HybridArc, names: Sequence[str]) -> dict[int, tuple[np.ndarray, np.ndarray]]:

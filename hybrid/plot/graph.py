@@ -12,6 +12,7 @@ import numpy as np
 from hybrid.plot.style import axes_for, colour_of
 from hybrid.system.elements import END, Transition
 from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.members import about_all, shared_name
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -36,9 +37,10 @@ def plot_graph(
 
     A label's upward arrow means that the guard rises through zero, a downward arrow that it falls. The label
     of a clock says when it ticks. Dashed edges reset the state; grey edges of dashes and dots lead to the
-    limit of a chatter. Modes have the same colours as in the other plots. A dot is the end of a run.
-    Transitions that only fire at the start of a run are left out. In a graph of more than a few modes, the
-    transitions between the same two modes share an arrow, and names such as ``a->b`` are not repeated on it.
+    limit of a chatter. Those of all members of a repeat share an arrow, with their number. Modes have the
+    same colours as in the other plots. A dot is the end of a run. Transitions that only fire at the start of
+    a run are left out. In a graph of more than a few modes, the transitions between the same two modes share
+    an arrow, and names such as ``a->b`` are not repeated on it.
 
     Parameters
     ----------
@@ -101,10 +103,14 @@ def plot_graph(
 
 @attrs.frozen
 class _Edge:
-    """A transition as an arrow, or the way to the limit of its chatter."""
+    """A transition as an arrow, or the way to the limit of its chatter.
+
+    The transitions of ``count`` members of a repeat share an arrow.
+    """
 
     transition: Transition
     is_limit: bool = False
+    count: int = 1
 
     @property
     def ends(self) -> Ends:
@@ -114,11 +120,17 @@ class _Edge:
 
     def label(self, *, short: bool = False) -> str:
         """The name, and the direction of the guard or when the clock ticks; short without names of modes."""
-        transition = self.transition
+        transition, clock = self.transition, self.transition.clock
+        name = shared_name(transition.name)
+        if name != transition.name:
+            name = f"{name} ×{self.count}"
         if self.is_limit:
-            return f"limit of {transition.name}"
-        name, clock = transition.name, transition.clock
-        fires = DIRECTIONS[transition.guard.direction] if clock is None else clock.told
+            return f"limit of {name}"
+        fires = (
+            DIRECTIONS[transition.guard.direction]
+            if clock is None
+            else about_all(clock.told, transition.name)
+        )
         if short and name.startswith(f"{transition.source}->{transition.target}"):
             return fires
         name = name.removeprefix(f"{transition.source}: ")
@@ -140,12 +152,20 @@ def _edges_and_loops(system: HybridSystem) -> tuple[dict[Ends, list[_Edge]], dic
     loops: defaultdict[str, list[_Edge]] = defaultdict(list)
     drawn = [_Edge(each) for each in system.transitions if not each.guard.at_start]
     limits = [_Edge(each, is_limit=True) for each in system.transitions if each.accumulates_to is not None]
-    for edge in drawn + limits:
+    for edge in _shared(drawn + limits):
         if edge.ends[0] == edge.ends[1]:
             loops[edge.ends[0]].append(edge)
         else:
             edges[edge.ends].append(edge)
     return edges, loops
+
+
+def _shared(edges: Sequence[_Edge]) -> list[_Edge]:
+    """The edges with one for those of all members of a repeat between two modes."""
+    found: dict[Any, list[_Edge]] = {}
+    for edge in edges:
+        found.setdefault((shared_name(edge.transition.name), edge.ends, edge.is_limit), []).append(edge)
+    return [attrs.evolve(same[0], count=len(same)) for same in found.values()]
 
 
 def _bundles(edges: Mapping[Ends, list[_Edge]], crowd: int) -> Iterator[tuple[Ends, list[_Edge]]]:

@@ -12,11 +12,14 @@ from hybrid.plot.style import COLOURS, Rows, axes_for, colour_of, mark, plain, s
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.jumps import Jumps
 from hybrid.simulation.labelled import Names
+from hybrid.system.members import about_all, shared_name, shared_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MARKS = {"transverse": "|", "grazing": "o", "limit": ">"}
+# Height of the row of a further member of a repeat, in rows.
+MEMBER = 0.25
 # The least error drawn on a logarithmic scale.
 LEAST = 1e-300
 
@@ -43,7 +46,7 @@ class ErrorBounds(Protocol):
 def plot_jumps(jumps: Jumps, *, ax: Axes | None = None, figsize: tuple[float, float] | None = None) -> Axes:
     """Draw jumps over time: one row per transition, dots for grazings, triangles for limits of chatter.
 
-    The row of a clock says when it ticks.
+    The row of a clock says when it ticks. The members of a repeat have a line each, in one row.
 
     Parameters
     ----------
@@ -68,26 +71,40 @@ def plot_jumps(jumps: Jumps, *, ax: Axes | None = None, figsize: tuple[float, fl
     ['impact', 'release']
     """
     arguments.instance("jumps", jumps, Jumps, "Take those of an arc: arc.jumps.")
-    fired = [name for name in jumps.system.transition_names if np.any(jumps.transition == name)]
-    (ax,) = axes_for(ax, 1, (7.0, 1.0 + 0.4 * max(len(fired), 1)), figsize)
-    for row, name in enumerate(fired):
-        for kind, marker in MARKS.items():
-            at = jumps.t[(jumps.transition == name) & (jumps.kind == kind)]
-            if len(at):
-                ax.plot(at, np.full(len(at), row), marker, color=colour_of(row), markersize=7)
+    system, names = jumps.system, jumps.system.transition_names
+    seen_names = {*np.unique(jumps.transition).tolist()}
+    fired = [*dict.fromkeys(shared_name(name) for name in names if name in seen_names)]
+    members = [shared_names(names).get(name, (name,)) for name in fired]
+    heights = np.array([1.0 + MEMBER * (len(each) - 1) for each in members])
+    ends = np.cumsum(heights) - 0.5
+    rows = ends - heights / 2
+    (ax,) = axes_for(ax, 1, (7.0, 1.0 + 0.4 * max(heights.sum(), 1.0)), figsize)
+    for i, each in enumerate(members):
+        places = rows[i] + MEMBER * (np.arange(len(each)) - (len(each) - 1) / 2)
+        for name, place in zip(each, places, strict=True):
+            _mark(ax, jumps, name, place, colour_of(i), 7 if len(each) == 1 else 4)
     seen = [kind for kind in MARKS if np.any(jumps.kind == kind)]
-    clocks = [jumps.system.transitions[jumps.system.transition_index(name)].clock for name in fired]
+    first = [system.transitions[system.copies_of(name)[0]] for name in fired]
+    clocks = [each.clock and about_all(each.clock.told, each.name) for each in first]
     pairs = zip(fired, clocks, strict=True)
-    labels = [name if clock is None else f"{name} ({clock.told})" for name, clock in pairs]
-    ax.set_yticks(range(len(fired)), labels)
-    ax.set_ylim(max(len(fired), 1) - 0.5, -0.5)
-    ax.set_xlabel(Names(jumps.system.state_names, jumps.system.units).label("t"))
+    labels = [name if clock is None else f"{name} ({clock})" for name, clock in pairs]
+    ax.set_yticks(rows, labels)
+    ax.set_ylim(heights.sum() - 0.5 if fired else 0.5, -0.5)
+    ax.set_xlabel(Names(system.state_names, system.units).label("t"))
     plain(ax)
     if seen and seen != ["transverse"]:
         for kind in seen:
             ax.plot([], [], MARKS[kind], color="0.35", label=kind)
         small_legend(ax)
     return ax
+
+
+def _mark(ax: Axes, jumps: Jumps, name: str, height: float, colour: str, size: float) -> None:
+    """Marks for the jumps of a transition."""
+    for kind, marker in MARKS.items():
+        at = jumps.t[(jumps.transition == name) & (jumps.kind == kind)]
+        if len(at):
+            ax.plot(at, np.full(len(at), height), marker, color=colour, markersize=size)
 
 
 def plot_global_error(

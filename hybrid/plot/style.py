@@ -23,6 +23,8 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 # Entries of a legend in one row.
 MOST_COLUMNS = 5
 
+# Largest number of members of a repeat that a legend lists.
+MOST_LISTED = 5
 # Diameter in points of a dot that fills a page.
 LARGEST_DOT = 1000.0
 
@@ -123,6 +125,23 @@ def _as_figsize(value: object) -> tuple[float, float]:
 def colour_of(mode: int) -> str:
     """The colour of the mode with this index."""
     return COLOURS[mode % len(COLOURS)]
+
+
+def member_colours(count: int) -> list[Any]:
+    """Colours of the members of a repeat: a scale from dark to light."""
+    from matplotlib import colormaps
+
+    return [colormaps["viridis"](place) for place in np.linspace(0.0, 0.85, count)]
+
+
+def member_legend(ax: Axes, names: Sequence[str], colours: Sequence[Any]) -> None:
+    """A legend of the members of a repeat on the right: all of a few, otherwise the first and the last."""
+    from matplotlib.lines import Line2D
+
+    count = len(names)
+    places = range(count) if count <= MOST_LISTED else (0, count - 1)
+    handles = [Line2D([], [], color=colours[i], label=names[i].rpartition(".")[0]) for i in places]
+    ax.legend(handles=handles, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
 
 
 def plain(ax: Axes) -> None:

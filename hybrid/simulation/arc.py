@@ -19,7 +19,7 @@ from hybrid.simulation.end import ArcEnd, end_without_component
 from hybrid.simulation.jumps import Grazing, Jumps, Sensitivities, known
 from hybrid.simulation.labelled import Names, attributes, with_counters, with_outputs
 from hybrid.simulation.points import Pieces, Samples, Steps
-from hybrid.simulation.quantities import Asked, quantity, slopes_of, table_of, values_of
+from hybrid.simulation.quantities import Asked, members, quantity, slopes_of, table_of, values_of
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
 
@@ -294,7 +294,7 @@ class HybridArc(Asked):
         """State at time ``t``, a scalar or an array, from the dense output: ``t.shape + (n,)``.
 
         At the time of a jump this is the state after it. With the ``name`` of a component or of an output it
-        is that one alone, ``t.shape``.
+        is that one alone, ``t.shape``; a name for all members of a repeat gives ``t.shape + (members,)``.
 
         Raises
         ------
@@ -302,7 +302,7 @@ class HybridArc(Asked):
             If a time lies outside the run, the run kept samples only, or there is no such name.
         """
         times = arguments.numbers("t", t, "be a time or an array of times")
-        if name is not None:
+        if name is not None and not members(name, self.system):
             quantity("name: ", name, self.system)
         if self._pieces is None:
             raise ArgumentError(
@@ -317,7 +317,7 @@ class HybridArc(Asked):
         if name is None:
             return states.reshape(*times.shape, self.system.dimension)
         found = values_of(self.system, name, inside.ravel(), states, modes, self._values)
-        return found.reshape(times.shape)
+        return found.reshape(*times.shape, *found.shape[1:])
 
     def states_and_modes(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """States ``(N, n)`` and indices of the modes ``(N,)`` at times in the run."""

@@ -16,7 +16,7 @@ from hybrid.display.tables import counted, html_table
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types.codes import AT
 from hybrid.simulation.labelled import Names, attributes, with_outputs
-from hybrid.simulation.quantities import quantity, values_of
+from hybrid.simulation.quantities import members, quantity, values_of
 from hybrid.simulation.saltation import matrices_at
 from hybrid.system.elements import END
 from hybrid.system.graph import HybridSystem
@@ -166,6 +166,8 @@ def known(sensitivities: Sensitivities | None) -> Sensitivities:
 class Jumps(Sequence[Jump]):
     """The jumps of an arc in order; ``jumps["impact"]`` are those of one transition, or of all its copies.
 
+    ``jumps["cell.empty"]`` are those of all members of a repeat, ``jumps["cell[3].empty"]`` those of one.
+
     Each :class:`Jump` is made when it is looked at; the arrays hold all of them.
 
     Attributes
@@ -236,6 +238,8 @@ class Jumps(Sequence[Jump]):
     def before(self, name: str) -> np.ndarray:
         """A component or an output before the jumps, in the modes that they leave, ``(jumps,)``.
 
+        A name for all members of a repeat gives ``(jumps, members)``.
+
         Raises
         ------
         ArgumentError
@@ -258,7 +262,8 @@ class Jumps(Sequence[Jump]):
         return self._quantity(name, self.x_plus, np.array(targets, dtype=np.int64))
 
     def _quantity(self, name: str, x: np.ndarray, mode: np.ndarray) -> np.ndarray:
-        quantity("name: ", name, self.system)
+        if not members(name, self.system):
+            quantity("name: ", name, self.system)
         return values_of(self.system, name, self.t, x, mode, self._parameters)
 
     @cached_property

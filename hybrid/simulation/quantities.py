@@ -16,6 +16,7 @@ from hybrid.expression.tracing import Symbols, model_symbols, trace
 from hybrid.system.derivatives import COMPLEX_STEP, complex_step_error, evaluate
 from hybrid.system.functions import ModelFunction
 from hybrid.system.graph import HybridSystem
+from hybrid.system.members import shared_names
 from hybrid.system.variables import Variables
 
 
@@ -23,6 +24,11 @@ def quantity(title: str, name: object, system: HybridSystem) -> str:
     """The name of a component or of an output, or an ArgumentError that begins with ``title``."""
     what, kind = words_for(bool(system.outputs))
     return arguments.known(f"{title}{what}", name, system.quantity_names, kind)
+
+
+def members(name: object, system: HybridSystem) -> tuple[str, ...]:
+    """The components or outputs of all members that a name such as ``cell.soc`` stands for; else none."""
+    return shared_names(system.quantity_names).get(name, ()) if isinstance(name, str) else ()
 
 
 def output_names(title: str, given: object, system: HybridSystem) -> tuple[str, ...]:
@@ -49,13 +55,17 @@ class Asked:
     def __getitem__(self, name: str) -> np.ndarray:
         """A component of the state or an output at the points, ``(N,)``.
 
-        An output is nan in modes in which it has no value.
+        An output is nan in modes in which it has no value. A name for all members of a repeat, such as
+        ``cell.soc``, gives ``(N, members)``.
 
         Raises
         ------
         ArgumentError
             If there is no component and no output of that name.
         """
+        of_members = members(name, self.system)
+        if of_members:
+            return self._table(of_members)
         return self._table([quantity("", name, self.system)])[:, 0]
 
     def _table(self, names: Iterable[str]) -> np.ndarray:
@@ -77,12 +87,15 @@ def values_of(
     Parameters
     ----------
     name
-        One of ``system.quantity_names``.
+        One of ``system.quantity_names``, or a name for all members of a repeat, which gives ``(N, members)``.
     t, x, mode
         Times ``(N,)``, states ``(N, n)``, indices of the modes ``(N,)``.
     parameters
         Their values, ``(m,)``, or ``(N, m)`` if they differ from point to point.
     """
+    of_members = members(name, system)
+    if of_members:
+        return table_of(system, of_members, t, x, mode, parameters)
     return Evaluator(system, name)(t, x, mode, parameters)
 
 

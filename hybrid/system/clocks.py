@@ -11,8 +11,9 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.errors import ModelError, shown
-from hybrid.system.members import is_component_name
+from hybrid.system.members import groups_in, is_component_name
 from hybrid.system.portable import Portable
+from hybrid.system.variables import PARAMETERS, named_values
 
 # A number, the name of a parameter or of what resets alone change, or a function of ``p``, which has both.
 Quantity = Any
@@ -50,7 +51,12 @@ class Given:
         self.x, self.p = x, p
 
     def __getattr__(self, name: str) -> Any:
-        held = name not in self.p._fields and name in getattr(self.x, "_fields", ())
+        fields = getattr(self.x, "_fields", ())
+        if name in groups_in(fields):
+            # Members have parameters, and components besides.
+            both = named_values(PARAMETERS, (*self.p._fields, *fields), (*self.p, *self.x))
+            return getattr(both, name)
+        held = name not in self.p._fields and name in fields
         return getattr(self.x if held else self.p, name)
 
     def __iter__(self) -> Any:

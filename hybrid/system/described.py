@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from html import escape
 from textwrap import fill
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 from hybrid.display.tables import html_table, table, with_unit
 from hybrid.system.clocks import Clock
 from hybrid.system.elements import END, Guard
+from hybrid.system.members import about_all, condensed, shared_name, shared_names
 
 TRANSITION_COLUMNS = ("transition", "from", "to", "guard", "condition", "reset", "limit of chatter")
 # Width of a terminal, in characters.
@@ -33,35 +34,32 @@ def described_in_html(system: Any) -> str:
 def _heading(system: Any) -> list[str]:
     units = system.units
     variables = system.variables
-    state = _listed(system, variables.state_names[: variables.moving])
+    state = _names_told(_own(system, variables.state_names[: variables.moving]), units)
     if isinstance(system.state, int) and not any(name in units for name in system.state_names):
         state = f"{system.state} components"
-    parameters = ", ".join(
-        f"{name} = {value:.6g} {units.get(name, '')}".rstrip() for name, value in system.parameters.items()
-    )
     lines = [
         f"HybridSystem {system.name}".rstrip(),
         f"state: {state}",
-        f"parameters: {parameters or 'none'}",
+        f"parameters: {_parameters_told(system) or 'none'}",
         f"modes: {', '.join(map(repr, system.mode_names))}",
     ]
     if system.under_way:
         waits = [repr(each.name) for each in system.transitions if each.clock and each.clock.kind == "Delay"]
         lines.insert(2, f"under way: {len(system.under_way)} components, for {', '.join(waits)}")
     for kind in ("counters", "held"):
-        listed = _listed(system, getattr(system, kind))
+        listed = _names_told(_own(system, getattr(system, kind)), units)
         lines[2:2] = [f"{kind}: {listed}"] if listed else []
     if "t" in units:
         lines.insert(2, f"time: {with_unit('t', units['t'])}")
     if system.outputs:
-        lines.append(f"outputs: {', '.join(with_unit(name, units.get(name)) for name in system.outputs)}")
+        lines.append(f"outputs: {_names_told(tuple(system.outputs), units)}")
     if system.start is not None:
         lines.append(f"start: {system.start!r}")
     if system.listed_order:
         lines.append("listed order: decides where guards are reached together")
     if system.angles:
-        turns = ", ".join(f"{name} turns in {turn:.6g}" for name, turn in system.angles.items())
-        lines.append(f"angles: {turns}")
+        turns = {shared_name(name): f"turns in {turn:.6g}" for name, turn in system.angles.items()}
+        lines.append(f"angles: {', '.join(f'{name} {turn}' for name, turn in turns.items())}")
     if system.period is not None:
         lines.append(f"period: {_period_told(system)}")
     if system.switching:
@@ -73,10 +71,37 @@ def _heading(system: Any) -> list[str]:
     return lines
 
 
-def _listed(system: Any, names: Iterable[str]) -> str:
-    """Those of the names that an author gave, with their units."""
-    own = (name for name in names if name not in system.under_way)
-    return ", ".join(with_unit(name, system.units.get(name)) for name in own)
+def _own(system: Any, names: Iterable[str]) -> tuple[str, ...]:
+    """Those of the names that an author gave."""
+    return tuple(name for name in names if name not in system.under_way)
+
+
+def _names_told(names: tuple[str, ...], units: Mapping[str, str]) -> str:
+    """Names with their units; those of all members of a repeat are one, with their number."""
+    shared = {each: one for each, (one, *_) in shared_names(names).items()}
+    told = [
+        _counted(with_unit(name, units.get(shared.get(name, name))), name, names) for name in condensed(names)
+    ]
+    return ", ".join(told)
+
+
+def _counted(text: str, name: str, names: tuple[str, ...]) -> str:
+    """A text about a name, with the number of members that it stands for."""
+    members = shared_names(names).get(name)
+    return text if members is None else f"{text} ×{len(members)}"
+
+
+def _parameters_told(system: Any) -> str:
+    """The default values; of those of all members the least and the largest."""
+    names, shared, found = tuple(system.parameters), shared_names(tuple(system.parameters)), []
+    for name in condensed(names):
+        members = shared.get(name, (name,))
+        values = [system.parameters[each] for each in members]
+        least, largest = (f"{each:.6g}" for each in (min(values), max(values)))
+        value = least if least == largest else f"{least} to {largest}"
+        text = f"{name} = {value} {system.units.get(members[0], '')}".rstrip()
+        found.append(_counted(text, name, names))
+    return ", ".join(found)
 
 
 def _period_told(system: Any) -> str:
@@ -89,17 +114,20 @@ def _period_told(system: Any) -> str:
 
 
 def _transition_rows(system: Any) -> list[list[str]]:
+    """A row per transition; those of all members of a repeat share one."""
+    first = {shared_name(each.name): each for each in reversed(system.transitions)}
+    names = system.transition_names
     return [
         [
-            transition.name,
+            _counted(name, name, names),
             transition.source,
             END if transition.target is None else transition.target,
-            _guard_told(transition.guard),
+            about_all(_guard_told(transition.guard), transition.name),
             "" if transition.guard.when is None else "yes",
             "" if transition.reset is None else "yes",
             transition.accumulates_to or "",
         ]
-        for transition in system.transitions
+        for name, transition in ((name, first[name]) for name in condensed(names))
     ]
 
 

@@ -129,14 +129,14 @@ def _mode(system: Any, mode: Any) -> Any:
 def _transitions(repeated: Repeat, i: int) -> Iterator[Transition]:
     """The transitions of a member."""
 
-    def own(function: Callable[..., Any] | None) -> MemberFunction | None:
+    def own(function: Callable[..., Any] | None) -> Any:
         return None if function is None else MemberFunction(function, i)
 
     for each in repeated.transitions:
         guard, reset = each.guard, each.reset
         if isinstance(guard, Guard):
-            changed = {"gradient": own(guard.gradient), "when": own(guard.when)}
-            guard = attrs.evolve(guard, function=own(guard.function), **changed)
+            changed = {name: own(getattr(guard, name)) for name in ("function", "gradient", "when")}
+            guard = attrs.evolve(guard, **changed)
         else:
             guard = _clock(repeated, i, guard)
         if reset is not None:

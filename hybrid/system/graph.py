@@ -32,6 +32,7 @@ from hybrid.system.given import (
 )
 from hybrid.system.growth import Growth
 from hybrid.system.laws import Laws, placed
+from hybrid.system.members import shared_name
 from hybrid.system.moving import moving_numbers
 from hybrid.system.outputs import Output, as_outputs, check_outputs
 from hybrid.system.periodicity import Period, period_at
@@ -378,10 +379,17 @@ class HybridSystem(Portable):
         return tuple(dict.fromkeys(mode.part_of or mode.name for mode in self.modes))
 
     def copies_of(self, name: str) -> list[int]:
-        """Indices of the transitions that are copies of a transition, or of the one of that name."""
+        """Indices of the transitions that are copies of a transition, or of the one of that name.
+
+        ``cell.empty`` is the name for those of all members of a repeat.
+        """
         copies = []
         if isinstance(name, str):
-            copies = [i for i, each in enumerate(self.transitions) if name in (each.name, each.part_of)]
+            copies = [
+                i
+                for i, each in enumerate(self.transitions)
+                if name in (each.name, each.part_of, shared_name(each.part_of or each.name))
+            ]
         return copies or [self.transition_index(name)]
 
     def transition_index(self, name: str | Transition) -> int:

@@ -117,7 +117,7 @@ def grouped_class(
         if parts is None:
             own.append(name)
         else:
-            groups.setdefault(parts.group, {}).setdefault(parts.index, {})[parts.name] = place
+            groups.setdefault(parts.group, {}).setdefault(parts.number, {})[parts.name] = place
     for group, members in groups.items():
         # Of the parameters of a member some may be states, and their names are missing here.
         each = [members.get(i, {}) for i in range(max(members) + 1)]

@@ -63,7 +63,7 @@ class MemberReset(Wrapper):
         return found
 
 
-@attrs.frozen
+@attrs.frozen(eq=False)
 class Part:
     """The fields of the members of one repeat.
 
@@ -97,7 +97,7 @@ class Part:
         return [rates[name] for name in self.names]
 
 
-@attrs.frozen
+@attrs.frozen(eq=False)
 class JoinedField(Wrapper):
     """The field of a mode: the rates of the system's ``names``, then those of the members."""
 

@@ -22,7 +22,7 @@ class MemberName(NamedTuple):
     """The parts of a name such as ``cell[3].soc``."""
 
     group: str
-    index: int
+    number: int
     name: str
 
     @property
@@ -49,6 +49,14 @@ def shared_name(name: str) -> str:
     return name if found is None else found.shared
 
 
+def about_all(text: str, name: str) -> str:
+    """A text about what the member of this name reads, as one about all members; another text as it is."""
+    parts = member_name(name)
+    return (
+        text if parts is None else text.replace(full_name(parts.group, parts.number, ""), f"{parts.group}.")
+    )
+
+
 @lru_cache(MOST_TUPLES)
 def shared_names(names: tuple[str, ...]) -> Mapping[str, tuple[str, ...]]:
     """Names for all members, each with the names of the members that it stands for, in order."""
@@ -58,6 +66,15 @@ def shared_names(names: tuple[str, ...]) -> Mapping[str, tuple[str, ...]]:
         if parts is not None:
             found.setdefault(parts.shared, []).append(name)
     return MappingProxyType({shared: tuple(each) for shared, each in found.items()})
+
+
+@lru_cache(MOST_TUPLES)
+def groups_in(names: tuple[str, ...]) -> Mapping[str, int]:
+    """The names of repeats that have members among these names, with the number of members."""
+    found: dict[str, int] = {}
+    for parts in filter(None, map(member_name, names)):
+        found[parts.group] = max(found.get(parts.group, 0), parts.number + 1)
+    return MappingProxyType(found)
 
 
 @lru_cache(MOST_TUPLES)

@@ -9,6 +9,7 @@ import numpy as np
 from hybrid.errors import ModelError
 from hybrid.system.clocks import Clock, Quantity
 from hybrid.system.elements import Transition
+from hybrid.system.members import full_name, groups_in
 from hybrid.system.variables import Variables
 
 
@@ -65,11 +66,18 @@ class _Asking:
 
     def __init__(self, variables: Variables) -> None:
         self.asked: set[str] = set()
+        self._groups = groups_in((*variables.state_names, *variables.parameter_names))
         self._parameters = {name: np.float64(value) for name, value in variables.parameters.items()}
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(name)
+        if name in self._groups:
+            return _AskingMembers([_AskingMember(self, name, i) for i in range(self._groups[name])])
+        return self.value(name)
+
+    def value(self, name: str) -> Any:
+        """The value of a parameter, or 1.0 for a component; the name is kept."""
         self.asked.add(name)
         return self._parameters.get(name, np.float64(1.0))
 
@@ -81,3 +89,24 @@ class _Asking:
 
     def __getitem__(self, place: Any) -> Any:
         return [*self._parameters.values()][place]
+
+
+class _AskingMember:
+    """The parameters of a member of a repeat, which keep the names that they are asked for."""
+
+    def __init__(self, asking: _Asking, group: str, index: int) -> None:
+        self._asking, self._group, self._index = asking, group, index
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return self._asking.value(full_name(self._group, self._index, name))
+
+
+class _AskingMembers(list[_AskingMember]):
+    """The same of all members."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return np.array([getattr(each, name) for each in self])

@@ -36,7 +36,7 @@ class Wrapper:
         raise NotImplementedError
 
 
-CALLABLE = FunctionType | MethodType | functools.partial | Wrapper
+CALLABLE = (FunctionType, MethodType, functools.partial, Wrapper)
 
 
 class Watched:
