@@ -82,7 +82,7 @@ def subject(
     """
     as_system("system", system)
     system.parameter_values(parameters)
-    values = {**system.parameters, **(parameters or {})}
+    values = {**system.parameters, **system.variables.overrides(parameters)}
     ends = {name: _range(value) for name, value in values.items()}
     for name, given in (ranges or {}).items():
         arguments.known("ranges: Parameter", name, system.parameters, "Parameters")

@@ -247,7 +247,8 @@ def goes_on_in(
             f"{arguments.shown(mode)}. For a run in another mode give x0=end.x and mode=."
         )
     own = dict(end.parameters)
-    given = dict(zip(own, system.parameter_values({**own, **(parameters or {})}).tolist(), strict=True))
+    changes = system.variables.overrides(parameters)
+    given = dict(zip(own, system.parameter_values({**own, **changes}).tolist(), strict=True))
     changed = [name for name in own if given[name] != own[name]]
     if changed:
         raise ArgumentError(

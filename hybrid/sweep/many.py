@@ -34,7 +34,6 @@ from hybrid.sweep.local import cores
 from hybrid.sweep.outcome import text_of
 from hybrid.sweep.sheet import UNTOUCHED, flags
 from hybrid.system.graph import HybridSystem, as_system, starting_mode
-from hybrid.system.labels import named
 
 if TYPE_CHECKING:
     import xarray
@@ -114,7 +113,7 @@ def simulate_many(
     most = arguments.count("max_jumps", max_jumps, 0)
     threads = cores() if executor is None else arguments.count("executor", executor, 1)
     system.parameter_values(parameters)
-    overrides = named("parameters", parameters)
+    overrides = system.variables.overrides(parameters)
     mode = starting_mode(system, mode)
     options = {"mode": mode, "parameters": overrides, "solver": check_solver(solver)}
     found = _Found(origins, times, t1, system.mode_names)

@@ -27,7 +27,8 @@ from hybrid.sweep.sheet import Labels
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, as_system, check_mode, starting_mode
 from hybrid.system.growth import Unexplored
-from hybrid.system.labels import by_label, named, plain_name
+from hybrid.system.labels import by_label, plain_name
+from hybrid.system.members import shared_names
 from hybrid.transform.aged import aged, with_age, without_age
 from hybrid.transform.markers import with_section
 
@@ -121,9 +122,12 @@ class Rows:
     def values(self, point: Mapping[str, float]) -> np.ndarray:
         """The parameter vector of a row."""
         values = self._values.copy()
-        for name, value in point.items():
-            if name not in self.starts:
-                values[self._place[plain_name(name)]] = value
+        given = [
+            (self._places[plain_name(name)], each) for name, each in point.items() if name not in self.starts
+        ]
+        # What is given to one member counts more than what is given to all.
+        for places, value in sorted(given, key=lambda each: -len(each[0])):
+            values[places] = value
         return values
 
     @cached_property
@@ -131,8 +135,12 @@ class Rows:
         return self.system.parameter_values(self.parameters)
 
     @cached_property
-    def _place(self) -> dict[str, int]:
-        return {name: i for i, name in enumerate(self.system.variables.parameter_names)}
+    def _places(self) -> dict[str, list[int]]:
+        names = self.system.variables.parameter_names
+        shared = {
+            name: [names.index(each) for each in members] for name, members in shared_names(names).items()
+        }
+        return {name: [i] for i, name in enumerate(names)} | shared
 
     def origin(self, point: Mapping[str, float]) -> np.ndarray:
         """The start of a row that does not go on from another row."""
@@ -227,18 +235,18 @@ def rows_of(
     """The rows of a sweep over parameters and components of the start, with every argument checked."""
     as_system("system", system)
     swept = as_points(over)
-    names = system.state_names
-    others = named("parameters", parameters)
+    names, shared = system.state_names, shared_names(system.variables.parameter_names)
+    others = system.variables.overrides(parameters)
     for name in map(plain_name, swept.names):
         if name not in names:
-            arguments.known("over: Parameter", name, system.parameters, "Parameters")
-        if name in others:
+            arguments.known("over: Parameter", name, (*system.parameters, *shared), "Parameters")
+        if name in others or any(each in others for each in shared.get(name, ())):
             raise ArgumentError(f"over: Parameter {name!r} is given twice: in over and in parameters.")
         if name in results:
             raise ArgumentError(
                 f"over: {name!r} is also the name of a result. Rename the parameter or state of the model."
             )
-    starts = tuple(name for name in swept.names if plain_name(name) not in system.parameters)
+    starts = tuple(name for name in swept.names if plain_name(name) in names)
     by_name = by_label("x0", x0)
     if by_name is not None:
         x0 = {**dict.fromkeys(map(plain_name, starts), 0.0), **by_name}

@@ -13,7 +13,10 @@ import numpy as np
 
 from hybrid.errors import ArgumentError, ModelError, shown
 
-_FULL_NAME = re.compile(r"([^\W\d]\w*)\[(0|[1-9]\d*)\]\.(.+)", re.DOTALL)
+_FULL_NAME = re.compile(r"([^\W\d]\w*)\[(0|[1-9]\d*)\]\.((?:[^\[\],<>=]|->)+)")
+# Signs that a name of a member cannot have, as the names of modes that are made from sides have them, such as
+# ``cell[3].v>0``; an arrow is none.
+RESERVED = "[],<>="
 # Numbers of tuples of names, and of names, whose parts are kept.
 MOST_TUPLES, MOST_NAMES = 256, 20_000
 

@@ -15,7 +15,7 @@ from hybrid.system.elements import Function, Guard, Reset, Transition
 from hybrid.system.frozen import FrozenMapping
 from hybrid.system.labels import named, plain_name
 from hybrid.system.laws import Laws
-from hybrid.system.members import entries, is_identifier
+from hybrid.system.members import RESERVED, entries, full_name, is_identifier, member_name
 from hybrid.system.outputs import Output, as_outputs
 from hybrid.system.portable import Portable
 
@@ -252,6 +252,12 @@ def _check_names(title: str, repeated: Repeat) -> None:
         for name in given:
             arguments.known(f"{title}: {what}: Name", name, known, "Names of a member")
     transitions = [each.name for each in repeated.transitions]
+    for each in (*transitions, *repeated.outputs):
+        if member_name(full_name(repeated.name, 0, each)) is None:
+            raise ModelError(
+                f"{title}: {each!r} cannot be the name of a transition or an output of a member. "
+                f"Leave out the signs {' '.join(RESERVED)}; a transition has the argument name=."
+            )
     twice = sorted({name for name in transitions if transitions.count(name) > 1})
     if twice:
         raise ModelError(

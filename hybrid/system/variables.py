@@ -168,11 +168,14 @@ class Variables:
         values.flags.writeable = False
         return values
 
+    def overrides(self, parameters: Mapping[str, Any] | None) -> dict[str, Any]:
+        """The argument ``parameters`` of a call by the names of single parameters, not yet checked."""
+        return spread("parameters", named("parameters", parameters), self.parameter_names)
+
     def parameter_values(self, overrides: Mapping[str, float] | None = None) -> np.ndarray:
         """Parameter vector ``(m,)`` with the overrides applied; unknown names raise an ArgumentError."""
         values, names = self.defaults.copy(), self.parameter_names
-        given = spread("parameters", named("parameters", overrides), names)
-        for name, number in given.items():
+        for name, number in self.overrides(overrides).items():
             arguments.known("parameters: Parameter", name, names, "Parameters")
             values[names.index(name)] = arguments.number(f"parameters: Parameter {name!r}", number)
         return values

@@ -29,7 +29,6 @@ from hybrid.sweep.sweep import sweep
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem
 from hybrid.system.growth import growing
-from hybrid.system.labels import named
 from hybrid.transform.aged import original_of, with_age
 
 if TYPE_CHECKING:
@@ -158,7 +157,7 @@ def _along(
     [(key, value)] = given.items()
     name = arguments.known("along: Parameter", key, system.parameters, "Parameters")
     system.parameter_values(parameters)
-    if name in named("parameters", parameters):
+    if name in system.variables.overrides(parameters):
         raise ArgumentError(f"along: Parameter {name!r} is given twice: in along and in parameters.")
     values = arguments.numbers(f"along[{name!r}]", value, "be values in order")
     if values.ndim != 1 or not values.size or not np.isfinite(values).all():

@@ -21,7 +21,6 @@ from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, as_system, check_mode
-from hybrid.system.labels import named
 from hybrid.transform.aged import aged, original_of
 from hybrid.transform.markers import with_section
 
@@ -119,7 +118,7 @@ def setup_of(system: HybridSystem, first: np.ndarray, given: Mapping[str, Any]) 
     """
     as_system("system", system)
     system = aged(system)
-    overrides = named("parameters", given["parameters"])
+    overrides = system.variables.overrides(given["parameters"])
     system.parameter_values(overrides)
     mode, section, interval = given["mode"], given["section"], given["interval"]
     if mode is not None:
