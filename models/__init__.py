@@ -17,6 +17,8 @@ from models.gear_pair import gear_pair
 from models.impact_oscillator import impact_oscillator
 from models.impact_pair import impact_pair
 from models.infusion_schedule import infusion_schedule
+from models.interleaved_converter import interleaved_converter
+from models.pulse_coupled_neurons import pulse_coupled_neurons
 from models.refractory_neuron import refractory_neuron
 from models.relief_valve import relief_valve
 from models.rimless_wheel import rimless_wheel
@@ -49,6 +51,8 @@ __all__ = [
     "impact_oscillator",
     "impact_pair",
     "infusion_schedule",
+    "interleaved_converter",
+    "pulse_coupled_neurons",
     "refractory_neuron",
     "relief_valve",
     "rimless_wheel",

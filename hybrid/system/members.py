@@ -125,6 +125,13 @@ def spread(
     return found | {name: value for name, value in given.items() if name not in shared}
 
 
+def for_each(given: dict[Any, Any], names: tuple[str, ...]) -> dict[Any, Any]:
+    """Values by name; one under a name for all members is that of each, as a range is."""
+    shared = shared_names(names)
+    found = {each: given[name] for name in shared.keys() & given.keys() for each in shared[name]}
+    return found | {name: value for name, value in given.items() if name not in shared}
+
+
 def entries(title: str, value: Any, count: int, error: type[ModelError] = ArgumentError) -> list[Any]:
     """The entry of each member: one value is that of all; otherwise the last axis has one for each."""
     if isinstance(value, str) or not isinstance(value, Iterable):

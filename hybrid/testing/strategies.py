@@ -19,6 +19,7 @@ from hybrid.system.derivatives import evaluate
 from hybrid.system.functions import field_function
 from hybrid.system.graph import HybridSystem, as_system, check_mode, laws_of
 from hybrid.system.labels import named
+from hybrid.system.members import for_each
 from hybrid.system.laws import Laws
 from hybrid.testing.case import TIGHT, Case
 from hybrid.testing.engine import LIBRARY, Engine
@@ -81,7 +82,7 @@ def _states(name: str, system: HybridSystem, ranges: Any) -> SearchStrategy[tupl
     names = as_system("system", system).state_names
     if isinstance(ranges, SearchStrategy):
         return ranges.map(lambda x: _drawn_state(name, len(names), x))
-    given = named(name, ranges, RANGES)
+    given = for_each(named(name, ranges, RANGES), names)
     for each in given:
         arguments.known(f"{name}: State component", each, names, "State components")
     # Nothing is under way, unless the author says so.
@@ -134,7 +135,7 @@ def _parameters(name: str, system: HybridSystem, ranges: Any) -> SearchStrategy[
     declared = dict(as_system("system", system).parameters)
     if isinstance(ranges, SearchStrategy):
         return ranges.map(lambda values: _drawn_parameters(name, declared, values))
-    chosen = named(name, ranges, RANGES)
+    chosen = for_each(named(name, ranges, RANGES), tuple(declared))
     for each in chosen:
         arguments.known(f"{name}: Parameter", each, declared, "Parameters")
     drawn = {

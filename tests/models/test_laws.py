@@ -94,6 +94,18 @@ RUNS = {
             "t_span": (0.0, 12.0),
         },
     ),
+    "interleaved_converter": (
+        models.interleaved_converter(2),
+        {
+            "states": {"v": (1.0, 5.0), "phase.i": (0.0, 3.0), "phase.w": 0.0, "phase.on": 0.0},
+            "parameters": {"k": (0.0, 0.01)},
+            "t_span": (0.0, 2e-4),
+        },
+    ),
+    "pulse_coupled_neurons": (
+        models.pulse_coupled_neurons(3),
+        {"states": {"neuron.u": (0.05, 0.95)}, "t_span": (0.0, 0.7)},
+    ),
     "impact_oscillator": (models.impact_oscillator(), {"states": {"x": (-1.0, 0.7)}, "t_span": (0.0, 7.0)}),
     "impact_pair": (models.impact_pair(), {"states": {"x": (-1.5, 1.5)}, "t_span": (0.0, 8.0)}),
     "refractory_neuron": (
@@ -187,6 +199,8 @@ MORE_UNCHECKED = {
     # The age that tangent vectors need has no unit.
     "refractory_neuron": {DIMENSIONS},
     "digital_pwm": {CROSSINGS, CUT, DIMENSIONS, SUM_RULE},
+    "interleaved_converter": {CUT},
+    "pulse_coupled_neurons": {DIMENSIONS},
 }
 # Few starts lead to these; a belt carries a block away from where it would slip ahead.
 RARE = {
