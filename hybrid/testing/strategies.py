@@ -19,8 +19,8 @@ from hybrid.system.derivatives import evaluate
 from hybrid.system.functions import field_function
 from hybrid.system.graph import HybridSystem, as_system, check_mode, laws_of
 from hybrid.system.labels import named
-from hybrid.system.members import for_each
 from hybrid.system.laws import Laws
+from hybrid.system.members import for_each
 from hybrid.testing.case import TIGHT, Case
 from hybrid.testing.engine import LIBRARY, Engine
 from hybrid.testing.starts import start_in
