@@ -52,7 +52,7 @@ def test_many_fire_as_computed_interval_by_interval(count):
     np.testing.assert_allclose(arc.jumps.t, [t for t, _ in exact], rtol=1e-10)
     for t in np.unique(np.round(arc.jumps.t, 6)):
         here = np.abs(arc.jumps.t - t) < 1e-5
-        together = {name for name in arc.jumps.transition[here]}
+        together = set(arc.jumps.transition[here])
         assert together == {f"neuron[{i}].fire" for s, i in exact if abs(s - t) < 1e-5}
 
 

@@ -127,7 +127,7 @@ class TestExpansion:
         again = pickle.loads(cloudpickle.dumps(system()))
         ends = [simulate(each, {"cell.u": 0.2}, (0.0, 2.0)).x[-1] for each in (system(), again)]
         np.testing.assert_array_equal(*ends)
-        with pytest.raises(ModelError, match="function cannot be pickled"):
+        with pytest.raises(ModelError, match="field cannot be pickled"):
             pickle.dumps(system())
 
 
@@ -155,7 +155,7 @@ class TestFunctions:
         share = Reset(lambda t, x, p: {"cell.u": np.where(x.cell.u > 0.5, x.cell.u / 2, x.cell.u)})
         halved = system(cells(4), transitions=[Transition("run", "run", At([0.1]), share, name="share")])
         arc = simulate(halved, {"cell.u": [0.1, 0.2, 0.7, 0.6]}, (0.0, 0.2))
-        expected = np.array([0.2, 0.35, (0.7 + 0.2) / 2 + 0.2, (0.6 + 0.25) / 2 + 0.25])
+        expected = np.array([0.3, 0.5, (0.7 + 0.2) / 2 + 0.2, (0.6 + 0.25) / 2 + 0.25])
         np.testing.assert_allclose(arc["cell.u"][-1], expected, rtol=1e-12)
 
     def test_what_does_not_exist_is_said(self):
@@ -195,7 +195,6 @@ class TestFunctions:
 
 class TestTransitions:
     def test_members_that_fire_at_one_instant_fire_in_order(self):
-        order = []
         first = Transition("run", "run", Guard(lambda t, x, p: x.q - 1.0, +1), name="own")
         both = system(
             cells(3, parameters={"rate": 1.0}, transitions=[fire(), fire(name="again")]),
@@ -275,18 +274,15 @@ class TestTransitions:
         # Each cell is a clock of its own: a sawtooth of slope 1 in its start, and 1.1 in its rate.
         np.testing.assert_allclose(arc.fundamental[:3, :3], np.eye(3), atol=1e-9)
         np.testing.assert_allclose(arc.sensitivity[:3, 0], [0.0, 1.1, 0.0], atol=1e-9)
-        [jump] = arc.jumps["cell[2].fire"]
-        assert jump.saltation.shape == (3, 3)
+        np.testing.assert_allclose(arc.jumps["cell[2].fire"][0].saltation, np.eye(3), atol=1e-9)
 
     def test_a_given_gradient_and_jacobian_of_members_are_checked(self):
         def gradient(t, x, p, i):
             return [1.0 if j == i else 0.0 for j in range(3)] + [0.0] * 3
 
         right = Guard(lambda t, x, p, i: x.cell[i].u - 1.0, +1, gradient=gradient)
-        assert (
-            len(simulate(system(cells(transitions=[fire(guard=right)])), {"cell.u": 0.0}, (0, 0.9)).jumps)
-            == 2
-        )
+        arc = simulate(system(cells(transitions=[fire(guard=right)])), {"cell.u": 0.0}, (0.0, 0.9))
+        assert len(arc.jumps) == 2
         wrong = attrs.evolve(right, gradient=lambda t, x, p, i: [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
         with pytest.raises(ModelError, match=r"Transition 'cell\[1\].fire': gradient"):
             system(cells(transitions=[fire(guard=wrong)]))
@@ -302,17 +298,18 @@ class TestNames:
             [0.1, 0.2, 0.3],
             [0.1, 0.2, 0.3, 0.0, 0.0, 0.0],
         ):
-            assert simulate(both, start, (0.0, 0.0)).x[0].tolist() == [0.1, 0.2, 0.3, 0.0, 0.0, 0.0]
+            found = simulate(both, start, (0.0, 0.0)).x[0]
+            np.testing.assert_allclose(found, [0.1, 0.2, 0.3, 0.0, 0.0, 0.0], rtol=1e-12)
         with pytest.raises(ArgumentError, match=r"x0: 'cell.u' must be one value for all, or one for each"):
             simulate(both, {"cell.u": [0.1, 0.2]}, (0.0, 1.0))
-        with pytest.raises(ArgumentError, match="State component 'cell.v' does not exist"):
+        with pytest.raises(ArgumentError, match=r"State component 'cell\.v' does not exist"):
             simulate(both, {"cell.v": 0.1}, (0.0, 1.0))
 
     def test_parameters_of_one_and_of_all(self):
         both = system()
         arc = simulate(both, [0.0] * 3, (0.0, 0.4), parameters={"cell[1].rate": 0.5, "cell.rate": 2.0})
         np.testing.assert_allclose(arc["cell.u"][-1], [0.8, 0.2, 0.8], rtol=1e-12)
-        assert arc.parameters["cell[0].rate"] == 2.0
+        assert arc.parameters["cell[0].rate"] == pytest.approx(2.0)
         arc = simulate(both, [0.0] * 3, (0.0, 0.4), parameters={"cell.rate": [0.1, 0.2, 0.3]})
         np.testing.assert_allclose(arc["cell.u"][-1], [0.04, 0.08, 0.12], rtol=1e-12)
 
@@ -321,23 +318,23 @@ class TestNames:
         end = simulate(both, [0.0] * 3, (0.0, 0.4)).end
         given = {"cell.rate": [1.0, 1.5, 2.0]}
         assert simulate(both, end, (0.4, 0.5), parameters=given).status.ok
-        with pytest.raises(ArgumentError, match=r"the end of a run with cell\[0\].rate = 1.0; got 5.0"):
+        with pytest.raises(ArgumentError, match=r"the end of a run with cell\[0\].rate = 1\.0.*; got 5\.0"):
             simulate(both, end, (0.4, 0.5), parameters={"cell.rate": 5.0})
 
     def test_results_by_name_of_one_and_of_all(self):
         both = system(cells(outputs={"left": lambda t, x, p, i: 1.0 - x.cell[i].u}))
-        arc = simulate(both, {"cell.u": 0.0}, (0.0, 2.0))
+        arc = simulate(both, {"cell.u": 0.0}, (0.0, 2.1))
         assert arc["cell.u"].shape == arc["cell.left"].shape == (len(arc.t), 3)
         np.testing.assert_array_equal(arc["cell.u"][:, 1], arc["cell[1].u"])
         np.testing.assert_allclose(arc["cell.left"], 1.0 - arc["cell.u"])
         assert arc([0.1, 0.2], "cell.u").shape == (2, 3)
         np.testing.assert_allclose(arc(0.3, "cell.u"), [0.3, 0.45, 0.6])
         assert arc.jumps.before("cell.u").shape == (len(arc.jumps), 3)
-        assert len(arc.jumps["cell.fire"]) == len(arc.jumps) == 2 + 3 + 4 - 1 or len(arc.jumps) == 9
+        assert len(arc.jumps["cell.fire"]) == len(arc.jumps) == 9
         assert {jump.transition for jump in arc.jumps["cell[2].fire"]} == {"cell[2].fire"}
         data = arc.to_xarray()
         np.testing.assert_array_equal(data.x.sel(state="cell[2].u"), arc["cell[2].u"])
-        with pytest.raises(ArgumentError, match="State component or output 'cell.v' does not exist"):
+        with pytest.raises(ArgumentError, match=r"State component or output 'cell\.v' does not exist"):
             arc["cell.v"]
 
     def test_many_starts(self):
@@ -416,7 +413,6 @@ def test_split_makes_modes_of_kinks_in_members():
     )
     dry = split(HybridSystem(repeats=[blocks], modes=[Mode("slide", lambda t, x, p: ())]))
     arc = simulate(dry, {"block.q": 0.0, "block.v": [1.0, 2.0]}, (0.0, 1.0))
-    assert [jump.part_of if hasattr(jump, "part_of") else jump.transition for jump in arc.jumps]
     assert len(arc.jumps["block.wall"]) == len(arc.jumps["block[1].wall"]) == 1
     assert not arc.jumps["block[0].wall"]
     # Before it turns, block 1 swings about -0.1.
@@ -485,7 +481,7 @@ class TestRefusals:
                 lambda: system(cells(field=lambda t, x, p, i: {"u": 0.0, "n": 1.0})),
                 r"cell\[0\]: component 'n' does not exist. With a field: u",
             ),
-            (lambda: system(cells(field=lambda t, x, p, i: 1.0)), "the values must be a dict by name, or in order"),
+            (lambda: system(cells(field=lambda t, x, p, i: 1.0)), "must be a dict by name, or in order"),
             (
                 lambda: system(cells(transitions=[fire(reset=Reset(lambda t, x, p, i: {"w": 0.0}))])),
                 "State component 'w' does not exist",
@@ -500,7 +496,7 @@ class TestRefusals:
                 lambda: system(cells(transitions=[fire(reset=Reset(lambda t, x, p, i: {"cell.u": [0.0]}))])),
                 "a dict of what changes: 'cell.u' must be one value for all",
             ),
-            (lambda: HybridSystem(modes=[Mode("run", lambda t, x, p: ())]), "state needs at least one component"),
+            (lambda: HybridSystem(modes=[Mode("run", lambda t, x, p: ())]), "needs at least one component"),
         ],
     )  # fmt: skip
     def test_what_is_wrong_is_said(self, make, text):
