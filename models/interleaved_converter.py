@@ -92,7 +92,7 @@ def interleaved_converter(phases: int = 4) -> HybridSystem:
         modes=[Mode("run", _run)],
         period=_period,
         outputs={"current": _current},
-        laws=Laws(balance={"energy": (_energy, _power)}),
+        laws=Laws(balance={"energy": (_energy, _power)}, alike=["phase"]),
     )  # fmt: skip
 
 

@@ -75,6 +75,7 @@ def pulse_coupled_neurons(count: int = 10) -> HybridSystem:
         modes=[Mode("charge", lambda t, x, p: ())],
         outputs={"mean": _mean},
         units={"mean": "1", "eps": "1"},
+        laws=Laws(alike=["neuron"]),
     )
 
 

@@ -188,6 +188,11 @@ def _laws(repeated: Repeat, i: int) -> Laws:
         return Law(name, each.of, own(each.quantity), own(each.flow))
 
     elastic = laws.elastic
+    if laws.alike:
+        raise ModelError(
+            f"repeat {repeated.name!r}: laws: alike names repeats, which members do not have; got "
+            f"{', '.join(laws.alike)}. Give it to the laws of the system."
+        )
     if callable(elastic):
         raise ModelError(
             f"repeat {repeated.name!r}: laws: elastic must be names of components of a member; got a "

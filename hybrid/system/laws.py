@@ -13,6 +13,7 @@ from hybrid.errors import ModelError
 from hybrid.system.checks import trial
 from hybrid.system.elements import Function
 from hybrid.system.labels import named
+from hybrid.system.members import groups_in
 from hybrid.system.outputs import Component, Output, function_in
 from hybrid.system.portable import Portable
 from hybrid.system.rows import fires, plain_firing
@@ -133,6 +134,11 @@ def _continuous(given: Any) -> tuple[str, ...]:
     return tuple(arguments.instance(f"continuous[{i}]", name, str) for i, name in enumerate(names))
 
 
+def _alike(given: Any) -> tuple[str, ...]:
+    names = arguments.items("alike", given, "be names of repeats")
+    return tuple(arguments.instance(f"alike[{i}]", name, str) for i, name in enumerate(names))
+
+
 def _elastic(given: Any) -> Elastic | None:
     if given is None or callable(given):
         return given
@@ -181,6 +187,10 @@ class Laws(Portable):
     elastic
         For a system that conserves energy: names of the components that change sign when time is reversed,
         or the involution of the state. A run with time reversed must return to its start.
+    alike
+        Names of repeats whose members are alike: to exchange two of them, in the state and among the
+        parameters, exchanges what functions give, and changes nothing else. They find an index that is
+        one off, a neighbour that is forgotten, and a number of one member that should be a parameter.
 
     Raises
     ------
@@ -206,6 +216,7 @@ class Laws(Portable):
     continuous: tuple[str, ...] = attrs.field(default=(), converter=_continuous)
     across: tuple[Law, ...] = attrs.field(default=(), converter=_across)
     elastic: Elastic | None = attrs.field(default=None, converter=_elastic)
+    alike: tuple[str, ...] = attrs.field(default=(), converter=_alike)
 
     @property
     def in_modes(self) -> dict[str, tuple[Law, ...]]:
@@ -222,6 +233,7 @@ class Laws(Portable):
             continuous=(*self.continuous, *other.continuous),
             across=(*self.across, *other.across),
             elastic=self.elastic if other.elastic is None else other.elastic,
+            alike=(*self.alike, *other.alike),
         )
 
 
@@ -258,6 +270,9 @@ def placed(
             arguments.known("elastic: State component", name, variables.state_names, "State components")
     for name in laws.continuous:
         arguments.known("continuous: Transition", name, transitions, "Transitions")
+    for name in laws.alike:
+        repeats = groups_in((*variables.state_names, *variables.parameter_names))
+        arguments.known("alike: Repeat", name, repeats, "Repeats")
     for law in laws.across:
         arguments.known("across: Transition", law.of, transitions, "Transitions")
         with fires(plain_firing(0)):

@@ -100,6 +100,7 @@ def check_system(
     continuous: Iterable[str] | None = None,
     across: Mapping[str, Any] | None = None,
     elastic: Elastic | None = None,
+    alike: Iterable[str] | None = None,
     examples: int = 50,
     solver: Solver = TIGHT,
     engine: Engine = LIBRARY,
@@ -122,7 +123,7 @@ def check_system(
         Mode that runs start in; by default any mode whose guards allow the state.
     passable
         Names of transitions whose guard the state may cross and stay in the same mode.
-    invariant, equal, conserved, dissipated, balance, continuous, across, elastic
+    invariant, equal, conserved, dissipated, balance, continuous, across, elastic, alike
         What the author knows, as for :class:`hybrid.Laws`; beside the laws that the system carries. Starts
         are drawn where no ``invariant`` is negative and every ``equal`` is zero.
     examples
@@ -163,6 +164,7 @@ def check_system(
         "continuous": continuous,
         "across": across,
         "elastic": elastic,
+        "alike": alike,
     }
     if system.aging and system.age is None:
         # Only with the time since its mode was entered does a state tell how a run goes on.

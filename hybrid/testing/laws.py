@@ -15,15 +15,15 @@ from hybrid.simulation.jumps import Jump
 from hybrid.system.laws import Law, Laws
 from hybrid.system.outputs import function_in
 from hybrid.system.rows import fires, plain_firing
+from hybrid.testing.alike import check_alike
 from hybrid.testing.case import Case, as_case, jump_told, lasting, matrix_told
 from hybrid.testing.ends import whole_run
 from hybrid.testing.errors import PropertyError, discard
+from hybrid.testing.sizes import sizes_of_terms
 
 # A value may differ by this share of the sizes of its terms.
 TOLERANCE = 1e-8
-# The sizes of the terms are told by changes of the state by this share of the sizes of its components, at
-# some rows of a run.
-NUDGE = 1e-3
+# The sizes of terms are taken at some rows of a run.
 ROWS_OF_SIZE = 20
 # Laws are judged on the first rows of a run: more of them show nothing new.
 MOST_ROWS = 1000
@@ -74,6 +74,9 @@ def law_checks(laws: Laws) -> dict[str, Callable[[Case], None]]:
     for name in laws.continuous:
         told = f"State and field are continuous at {name!r}"
         add(told, partial(_check_continuous, name=name, told=told))
+    for name in laws.alike:
+        told = f"Members of {name!r} are alike"
+        add(told, partial(check_alike, name=name, told=told))
     return checks
 
 
@@ -221,7 +224,7 @@ def _check_across(case: Case, law: Law) -> None:
         else:
             n = len(jump.x_minus)
             both = np.concatenate([jump.x_minus, jump.x_plus])
-            size = _sizes(partial(_of_halves, there, n), both, found, scale)
+            size = sizes_of_terms(partial(_of_halves, there, n), both, found, scale)
             holds = bool(np.all(np.abs(found) <= TOLERANCE * size))
             got = f"got {matrix_told(found)}, not zero"
         if not holds:
@@ -310,16 +313,6 @@ def sized(case: Case, function: Any, t: float, x: Any, arc: HybridArc) -> tuple[
     """Values ``(rows,)`` of a function of ``(t, x, p)``, and the sizes of their terms on a run."""
     values = case.evaluate(function, t, x)
     scale = np.abs(arc.x).max(axis=0)
-    return values, _sizes(lambda y: case.evaluate(function, t, y), np.asarray(x, dtype=float), values, scale)
-
-
-def _sizes(
-    function: Callable[[np.ndarray], Any], x: np.ndarray, values: np.ndarray, scale: np.ndarray
-) -> np.ndarray:
-    """Sizes of the terms of a function, to which each component contributes what its size makes."""
-    sizes = np.abs(values)
-    for i in np.flatnonzero(scale):
-        aside = x.copy()
-        aside[i] += NUDGE * scale[i]
-        sizes = np.maximum(sizes, np.abs(function(aside) - values) / NUDGE)
-    return np.asarray(sizes)
+    return values, sizes_of_terms(
+        lambda y: case.evaluate(function, t, y), np.asarray(x, dtype=float), values, scale
+    )

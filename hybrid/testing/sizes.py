@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,8 @@ Derivative = Callable[[ModelFunction, int, float, np.ndarray], np.ndarray]
 
 # A component that stays small is given this share of what the others make of it.
 SHARE = 1e-3
+# The sizes of terms are told by changes of the state by this share of the sizes of its components.
+NUDGE = 1e-3
 
 
 def sizes_along(
@@ -56,3 +59,15 @@ def _absolute(derivative: np.ndarray) -> np.ndarray:
     """Absolute values ``(n, n)`` of a derivative in the state, zero where it is not finite."""
     slopes = np.abs(derivative[:, :-1])
     return np.where(np.isfinite(slopes), slopes, 0.0)
+
+
+def sizes_of_terms(
+    function: Callable[[np.ndarray], Any], x: np.ndarray, values: np.ndarray, scale: np.ndarray
+) -> np.ndarray:
+    """Sizes of the terms of a function, to which each component contributes what its size makes."""
+    sizes = np.abs(values)
+    for i in np.flatnonzero(scale):
+        aside = x.copy()
+        aside[i] += NUDGE * scale[i]
+        sizes = np.maximum(sizes, np.abs(function(aside) - values) / NUDGE)
+    return np.asarray(sizes)
