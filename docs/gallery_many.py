@@ -30,7 +30,7 @@ def firings_of_neurons(axes: Axes) -> None:
     arc = simulate(pulse_coupled_neurons(30), start, (0.0, 9.0), parameters={"eps": 0.006})
     firing = [int(name.partition("[")[2].partition("]")[0]) for name in arc.jumps.transition]
     axes.plot(arc.jumps.t, firing, "|", color=COLOURS[0], markersize=3)
-    axes.set(xlabel="t", ylabel="neuron that fires")
+    axes.set(xlabel="t (s)", ylabel="neuron that fires")
 
 
 PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [

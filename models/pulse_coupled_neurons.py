@@ -27,7 +27,7 @@ def pulse_coupled_neurons(count: int = 10) -> HybridSystem:
     -------
     HybridSystem
         Members ``neuron`` with the state ``u`` (potential, in units of the threshold); mode ``charge``;
-        transition ``fire`` of each. Parameters: drive ``S = 2``, leak ``gamma = 1`` (per unit of time), pulse
+        transition ``fire`` of each. Parameters: drive ``S = 2`` and leak ``gamma = 1`` per second, pulse
         ``eps = 0.02``. Output: ``mean``, the mean potential.
 
     Notes
@@ -74,7 +74,7 @@ def pulse_coupled_neurons(count: int = 10) -> HybridSystem:
         repeats=[neurons],
         modes=[Mode("charge", lambda t, x, p: ())],
         outputs={"mean": _mean},
-        units={"mean": "1", "eps": "1"},
+        units={"t": "s", "mean": "1", "S": "1/s", "gamma": "1/s", "eps": "1"},
         laws=Laws(alike=["neuron"]),
     )
 

@@ -41,6 +41,8 @@ DEFAULTS = {
     hybrid.Table: {"y": None, "kind": "linear", "unit": None, "origin": None},
     hybrid.Transition: {"reset": None, "accumulates_to": None, "part_of": None},
     hybrid.HybridSystem: {
+        "state": (),
+        "repeats": (),
         "held": (),
         "counters": (),
         "listed_order": False,
@@ -67,13 +69,18 @@ DEFAULTS = {
     hybrid.open_branch: {},
     hybrid.open_end: {},
     hybrid.filippov: {"start": None, **SYSTEM},
-    hybrid.from_equations: {**PLAIN, "modes": None},
+    hybrid.from_equations: {**PLAIN, "modes": None, "repeats": ()},
     hybrid.split: {"modes": None},
     hybrid.Laws: {
         **dict.fromkeys(
             ("invariant", "equal", "conserved", "dissipated", "balance", "continuous", "across"), ()
         ),
         "elastic": None,
+        "alike": (),
+    },
+    hybrid.repeat: {
+        **{"state": (), "held": (), "counters": (), "parameters": None, "field": None, "transitions": ()},
+        **{"units": None, "angles": None, "outputs": None, "laws": None},
     },
     hybrid.global_error: {**RUN, "max_jumps": 100_000},
     hybrid.simulate: {

@@ -182,7 +182,8 @@ def cases(
         Computes runs and derivatives.
     **options
         Laws beside those that the system carries, by the names of :class:`hybrid.Laws`: ``invariant``,
-        ``equal``, ``conserved``, ``dissipated``, ``balance``, ``continuous``, ``across`` and ``elastic``.
+        ``equal``, ``conserved``, ``dissipated``, ``balance``, ``continuous``, ``across``, ``elastic`` and
+        ``alike``.
 
     Raises
     ------

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from hybrid.system.elements import Function, Mode
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.laws import Laws
 from hybrid.system.periodicity import Period
+from hybrid.system.repeat import Repeat
 
 
 def from_equations(
@@ -23,6 +24,7 @@ def from_equations(
     outputs: Mapping[str, Any] | None = None,
     laws: Laws | None = None,
     modes: Mapping[str, Any] | None = None,
+    repeats: Iterable[Repeat] = (),
 ) -> HybridSystem:
     """The hybrid system of one right-hand side with ``np.sign``, ``np.abs``, ``np.where`` and the like.
 
@@ -36,6 +38,8 @@ def from_equations(
         As for `HybridSystem`.
     modes
         Names for the modes, as for `split`.
+    repeats
+        Many of a kind, from `repeat`, whose equations may have kinks and jumps too.
 
     Raises
     ------
@@ -68,6 +72,7 @@ def from_equations(
             angles={} if angles is None else angles,
             outputs={} if outputs is None else outputs,
             laws=Laws() if laws is None else laws,
+            repeats=repeats,
         ),
         modes=modes,
     )

@@ -200,7 +200,6 @@ MORE_UNCHECKED = {
     "refractory_neuron": {DIMENSIONS},
     "digital_pwm": {CROSSINGS, CUT, DIMENSIONS, SUM_RULE},
     "interleaved_converter": {CUT},
-    "pulse_coupled_neurons": {DIMENSIONS},
 }
 # Few starts lead to these; a belt carries a block away from where it would slip ahead.
 RARE = {

@@ -19,6 +19,7 @@ from hybrid import (
     ModelError,
     Reset,
     Transition,
+    from_equations,
     repeat,
     simulate,
     simulate_many,
@@ -418,6 +419,22 @@ def test_split_makes_modes_of_kinks_in_members():
     # Before it turns, block 1 swings about -0.1.
     t = arc.jumps["block.wall"][0].t
     assert 2.0 * np.sin(t) - 0.1 * (1 - np.cos(t)) == pytest.approx(1.0, rel=1e-10)
+
+
+def test_plain_equations_of_members():
+    """Two blocks that are damped by dry friction come to rest."""
+    blocks = repeat(
+        "block",
+        2,
+        state=("q", "v"),
+        parameters={"mu": [0.3, 0.5]},
+        field=lambda t, x, p, i: (x.block[i].v, -x.block[i].q - p.block[i].mu * np.sign(x.block[i].v)),
+    )
+    dry = from_equations(lambda t, x, p: (-x.T,), state=("T",), repeats=[blocks])
+    arc = simulate(dry, {"T": 1.0, "block.q": [1.0, 0.9], "block.v": 0.0}, (0.0, 7.0))
+    # A swing ends 2 mu nearer to the middle; a block that begins within mu of it stays.
+    np.testing.assert_allclose(arc["block.q"][-1], [-0.4 + 0.2, -0.9 + 1.0], atol=1e-9)
+    assert arc["T"][-1] == pytest.approx(np.exp(-7.0))
 
 
 class TestRefusals:
