@@ -11,7 +11,7 @@ from hybrid.errors import ModelError, unknown_name
 from hybrid.system.clocks import function_of_number
 from hybrid.system.elements import Mode, Transition
 from hybrid.system.labels import plain_name
-from hybrid.system.members import spread
+from hybrid.system.members import shared_names, spread
 from hybrid.system.moving import moving_numbers
 from hybrid.system.variables import STATE, Variables
 
@@ -40,7 +40,7 @@ class WholeReset:
             return value
         changed = {plain_name(name): each for name, each in value.items()}
         if not isinstance(self.state, int):
-            changed = spread("a dict of what changes", changed, self.state, ModelError)
+            changed = spread("a dict of what changes", changed, shared_names(self.state), ModelError)
         names = checked_changes(changed, self.state)
         return tuple(changed.get(name, before) for name, before in zip(names, x, strict=True))
 

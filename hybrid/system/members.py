@@ -102,21 +102,20 @@ def is_component_name(name: object) -> bool:
 def spread(
     argument: str,
     given: dict[Any, Any],
-    names: tuple[str, ...],
+    shared: Mapping[str, tuple[str, ...]],
     error: type[ModelError] = ArgumentError,
 ) -> dict[Any, Any]:
     """Values by name, with those of all members (``cell.soc``) given to each one.
 
     Such a value is one for all members, or has an entry for each along its last axis. What is given to
-    a single member counts more.
+    a single member counts more. ``shared`` are the names for all members, from `shared_names`.
 
     Raises
     ------
     ModelError
         If there are more or fewer entries than members; of the class ``error``.
     """
-    shared = shared_names(names)
-    if shared.keys().isdisjoint(given):
+    if not shared or shared.keys().isdisjoint(given):
         return given
     found: dict[Any, Any] = {}
     for name in shared.keys() & given.keys():

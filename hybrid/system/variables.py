@@ -16,7 +16,7 @@ from hybrid.errors import ArgumentError, ModelError, unknown_name
 from hybrid.system.frozen import FrozenMapping
 from hybrid.system.grouped import UnknownComponentError, grouped_class
 from hybrid.system.labels import by_label, named, plain_name
-from hybrid.system.members import is_component_name, member_name, spread
+from hybrid.system.members import is_component_name, member_name, shared_names, spread
 
 STATE = "State components"
 PARAMETERS = "Parameters"
@@ -162,6 +162,16 @@ class Variables:
         return tuple(self.parameters)
 
     @cached_property
+    def _shared_components(self) -> Mapping[str, tuple[str, ...]]:
+        """Names for the components of all members of a repeat, if there are any."""
+        return shared_names(self.state_names)
+
+    @cached_property
+    def _shared_parameters(self) -> Mapping[str, tuple[str, ...]]:
+        """Names for the parameters of all members of a repeat, if there are any."""
+        return shared_names(self.parameter_names)
+
+    @cached_property
     def defaults(self) -> np.ndarray:
         """Default parameter vector ``(m,)``, read-only."""
         values = np.array(list(self.parameters.values()), dtype=float)
@@ -170,7 +180,7 @@ class Variables:
 
     def overrides(self, parameters: Mapping[str, Any] | None) -> dict[str, Any]:
         """The argument ``parameters`` of a call by the names of single parameters, not yet checked."""
-        return spread("parameters", named("parameters", parameters), self.parameter_names)
+        return spread("parameters", named("parameters", parameters), self._shared_parameters)
 
     def parameter_values(self, overrides: Mapping[str, float] | None = None) -> np.ndarray:
         """Parameter vector ``(m,)`` with the overrides applied; unknown names raise an ArgumentError."""
@@ -183,7 +193,7 @@ class Variables:
     def as_units(self, value: object, outputs: Iterable[str] = ()) -> Mapping[str, str]:
         """Units by name of a component, of a parameter, of an output or of the time ``t``, read-only."""
         title, names = "HybridSystem: units", (*self.state_names, *self.parameter_names, *outputs, "t")
-        given = spread(title, named(title, value, "map names to texts"), names)
+        given = spread(title, named(title, value, "map names to texts"), shared_names(names))
         for name, unit in given.items():
             arguments.known("HybridSystem: units: Name", name, names, "Names")
             arguments.instance(f"HybridSystem: units[{name!r}]", unit, str)
@@ -192,7 +202,9 @@ class Variables:
     def as_angles(self, value: object) -> Mapping[str, float]:
         """Lengths of a turn by name of a component, read-only."""
         title, names = "HybridSystem: angles", self.state_names
-        given = spread(title, named(title, value, "map names of the state to lengths of a turn"), names)
+        given = spread(
+            title, named(title, value, "map names of the state to lengths of a turn"), self._shared_components
+        )
         for name, turn in given.items():
             arguments.known("HybridSystem: angles: State component", name, names, STATE)
             given[name] = arguments.positive(f"HybridSystem: angles[{name!r}]", turn)
@@ -269,7 +281,7 @@ class Variables:
         given = by_label(name, value)
         if given is None:
             return None
-        given = spread(name, given, self.state_names)
+        given = spread(name, given, self._shared_components)
         for component in given:
             arguments.known(f"{name}: State component", component, self.state_names, "State components")
         given = dict.fromkeys((*self.state_names[self.moving :], *self.under_way), 0.0) | given
