@@ -72,11 +72,15 @@ def pulse_coupled_neurons(count: int = 10) -> HybridSystem:
         name="pulse-coupled neurons",
         parameters={"S": 2.0, "gamma": 1.0, "eps": 0.02},
         repeats=[neurons],
-        modes=[Mode("charge", lambda t, x, p: ())],
+        modes=[Mode("charge", _nothing_besides)],
         outputs={"mean": _mean},
         units={"t": "s", "mean": "1", "S": "1/s", "gamma": "1/s", "eps": "1"},
         laws=Laws(alike=["neuron"]),
     )
+
+
+def _nothing_besides(t, x, p):
+    return ()
 
 
 def _charge(t, x, p, i):

@@ -317,7 +317,7 @@ class HybridArc(Asked):
         if name is None:
             return states.reshape(*times.shape, self.system.dimension)
         found = values_of(self.system, name, inside.ravel(), states, modes, self._values)
-        return found.reshape(*times.shape, *found.shape[1:])
+        return found.reshape(times.shape + found.shape[1:])
 
     def states_and_modes(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """States ``(N, n)`` and indices of the modes ``(N,)`` at times in the run."""
