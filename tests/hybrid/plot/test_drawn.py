@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from hybrid import ArgumentError
-from hybrid.plot import DATASETS, drawn, plot
+from hybrid.plot import drawn, plot
 
 
 def told(name):
@@ -14,10 +14,8 @@ def told(name):
 
 def test_datasets_are_drawn_by_a_variable_that_they_have(monkeypatch):
     """The first that is registered decides; objects that are no datasets draw themselves."""
-    for name in list(DATASETS):
-        monkeypatch.delitem(DATASETS, name)
-    monkeypatch.setitem(DATASETS, "one", told("first"))
-    monkeypatch.setitem(DATASETS, "two", told("second"))
+    # Entries that are taken out and put back would stand in another order for the tests that follow.
+    monkeypatch.setattr("hybrid.plot.DATASETS", {"one": told("first"), "two": told("second")})
     own = SimpleNamespace(plot=lambda **options: ("own", options))
     for variables, wanted in (("two", "second"), ("two one", "first")):
         data = SimpleNamespace(data_vars=variables.split(), plot=own.plot)
