@@ -76,14 +76,16 @@ class Members:
         return kind._make([values[place] for place in places])
 
     def __getattr__(self, name: str) -> np.ndarray:
-        kind = self._layout.kind
         if name.startswith("__"):
             raise AttributeError(name)
-        for each, _ in self._layout.members:
-            if name not in each._fields:
-                what = f"{kind.removesuffix('s')} of {self._layout.group}"
-                raise UnknownComponentError(unknown_name(what, name, each._fields, kind))
-        return gathered([getattr(member, name) for member in self])
+        found = []
+        for kind, places in self._layout.members:
+            if name not in kind._fields:
+                kinds = self._layout.kind
+                what = f"{kinds.removesuffix('s')} of {self._layout.group}"
+                raise UnknownComponentError(unknown_name(what, name, kind._fields, kinds))
+            found.append(self._values[places[kind._fields.index(name)]])
+        return gathered(found)
 
 
 def gathered(values: list[Any]) -> np.ndarray:

@@ -106,7 +106,8 @@ def repeat(
         Each is made for each member. All its functions, and those of its clock, have the index ``i`` as last
         argument. A reset returns what changes, by name: the names of a member are its own components;
         others are written in full, ``"cell[4].u"``, ``"cell.u"`` or ``"v"`` of the system. A clock
-        reads the member's parameters and held components by their short names, ``After("refractory")``.
+        reads the member's parameters and held components by their short names, ``Every("period")``; the
+        time of an `After` is that since the entry of the mode, which all members share.
         The transition ``empty`` of member 3 has the name ``cell[3].empty``. Of transitions that fire at one
         instant those of member 0 come first, in listed order, then those of member 1, behind those of
         the system itself.
