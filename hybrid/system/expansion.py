@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import attrs
@@ -52,9 +52,6 @@ def expanded(system: Any) -> dict[str, Any]:
     parameters = dict(system.parameters)
     for each, i in members:
         parameters |= {full_name(each.name, i, name): v[i] for name, v in each.parameters.items()}
-    laws = system.laws
-    for each, i in members:
-        laws = laws.joined(_laws(each, i))
     return {
         "state": names("state"),
         "held": names("held"),
@@ -65,7 +62,7 @@ def expanded(system: Any) -> dict[str, Any]:
         "units": mapping("units"),
         "angles": mapping("angles"),
         "outputs": FrozenMapping(dict(system.outputs) | _outputs(members)),
-        "laws": laws,
+        "laws": _joined_laws(system.laws, members),
     }
 
 
@@ -128,32 +125,26 @@ def _mode(system: Any, mode: Any) -> Any:
 
 def _transitions(repeated: Repeat, i: int) -> Iterator[Transition]:
     """The transitions of a member."""
-
-    def own(function: Callable[..., Any] | None) -> Any:
-        return None if function is None else MemberFunction(function, i)
-
     for each in repeated.transitions:
         guard, reset = each.guard, each.reset
         if isinstance(guard, Guard):
-            changed = {name: own(getattr(guard, name)) for name in ("function", "gradient", "when")}
-            guard = attrs.evolve(guard, **changed)
+            names = ("function", "gradient", "when")
+            guard = attrs.evolve(guard, **{name: _own(repeated, i, getattr(guard, name)) for name in names})
         else:
             guard = _clock(repeated, i, guard)
         if reset is not None:
             function = MemberReset(reset.function, repeated.name, i, repeated.components)
-            reset = Reset(function, jacobian=own(reset.jacobian))
+            reset = Reset(function, jacobian=_own(repeated, i, reset.jacobian))
         name = full_name(repeated.name, i, each.name)
         yield attrs.evolve(each, guard=guard, reset=reset, name=name)
 
 
 def _clock(repeated: Repeat, i: int, clock: Clock) -> Clock:
     """A clock with the numbers of a member."""
+    known = (*repeated.parameters, *repeated.components)
 
     def own(quantity: Any) -> Any:
-        if isinstance(quantity, str):
-            known = (*repeated.parameters, *repeated.held, *repeated.counters, *repeated.state)
-            return _own_name(repeated, i, quantity, known)
-        return MemberFunction(quantity, i) if callable(quantity) else quantity
+        return _own(repeated, i, quantity, known)
 
     fields = [field.name for field in attrs.fields(type(clock)) if field.init]
     changed = {}
@@ -173,30 +164,47 @@ def _outputs(members: Iterable[tuple[Repeat, int]]) -> dict[str, Output]:
     return found
 
 
+def _joined_laws(own: Laws, members: Iterable[tuple[Repeat, int]]) -> Laws:
+    """The laws of a system with those of the members."""
+    found, elastic = own, list[str]()
+    for repeated, i in members:
+        found = found.joined(_laws(repeated, i))
+        elastic += _elastic(repeated, i)
+    if not elastic:
+        return found
+    if callable(own.elastic):
+        raise ModelError(
+            "HybridSystem: laws: elastic is a function of the whole state, and the laws of members name "
+            f"{elastic[0]!r} besides. Give it in one place."
+        )
+    return attrs.evolve(found, elastic=(*(own.elastic or ()), *elastic))
+
+
+def _elastic(repeated: Repeat, i: int) -> list[str]:
+    """The components of a member that change sign when time is reversed."""
+    names = repeated.laws.elastic
+    if callable(names):
+        raise ModelError(
+            f"repeat {repeated.name!r}: laws: elastic must be names of components of a member; got a "
+            "function. An involution of the whole state belongs to the laws of the system."
+        )
+    return [_own_name(repeated, i, name, repeated.components) for name in names or ()]
+
+
 def _laws(repeated: Repeat, i: int) -> Laws:
-    """The laws of a member, by full names."""
+    """The laws of a member that are no involution, by full names."""
     known, transitions = (*repeated.components, *repeated.outputs), [t.name for t in repeated.transitions]
     laws = repeated.laws
 
-    def own(quantity: Any) -> Any:
-        if isinstance(quantity, str):
-            return _own_name(repeated, i, quantity, known)
-        return MemberFunction(quantity, i) if callable(quantity) else quantity
-
     def law(each: Law) -> Law:
         name = full_name(repeated.name, i, each.name)
-        return Law(name, each.of, own(each.quantity), own(each.flow))
+        quantity, flow = (_own(repeated, i, what, known) for what in (each.quantity, each.flow))
+        return Law(name, each.of, quantity, flow)
 
-    elastic = laws.elastic
     if laws.alike:
         raise ModelError(
             f"repeat {repeated.name!r}: laws: alike names repeats, which members do not have; got "
             f"{', '.join(laws.alike)}. Give it to the laws of the system."
-        )
-    if callable(elastic):
-        raise ModelError(
-            f"repeat {repeated.name!r}: laws: elastic must be names of components of a member; got a "
-            "function. An involution of the whole state belongs to the laws of the system."
         )
     return Laws(
         **{kind: tuple(map(law, some)) for kind, some in laws.in_modes.items()},
@@ -205,8 +213,14 @@ def _laws(repeated: Repeat, i: int) -> Laws:
             attrs.evolve(law(each), of=_own_name(repeated, i, str(each.of), transitions))
             for each in laws.across
         ),
-        elastic=None if elastic is None else tuple(_own_name(repeated, i, name, known) for name in elastic),
     )
+
+
+def _own(repeated: Repeat, i: int, what: Any, known: Iterable[str] = ()) -> Any:
+    """A name or a function of a member as one of the system; another value as it is."""
+    if isinstance(what, str):
+        return _own_name(repeated, i, what, known)
+    return MemberFunction(what, i) if callable(what) else what
 
 
 def _own_name(repeated: Repeat, i: int, name: str, known: Iterable[str]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -10,11 +10,10 @@ import numpy as np
 
 from hybrid.arguments import shown
 from hybrid.errors import ModelError, unknown_name
+from hybrid.system.elements import Function
 from hybrid.system.labels import plain_name
 from hybrid.system.members import full_name
 from hybrid.system.watched import Wrapper
-
-Function = Callable[..., Any]
 
 
 @attrs.frozen

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from hybrid.system.clocks import function_of_number
 from hybrid.system.derivatives import evaluate
-from hybrid.system.elements import Guard, Transition
+from hybrid.system.elements import Function, Guard, Transition
 from hybrid.system.functions import condition_function, field_function, reset_function
 from hybrid.system.graph import HybridSystem
 from hybrid.system.members import full_name, groups_in, member_name
@@ -23,7 +23,6 @@ from hybrid.testing.sizes import sizes_of_terms
 TOLERANCE = 1e-8
 # Points of a run at which functions are compared.
 MOST_POINTS = 4
-Function = Callable[[Any, Any, Any], Any]
 
 
 @attrs.frozen(eq=False)

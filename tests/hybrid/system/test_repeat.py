@@ -391,6 +391,15 @@ class TestLaws:
         with pytest.raises(PropertyError, match=r"'cell\[0\].little' is non-negative"):
             check_laws(Case(both, both.parameters, "run", (0.2, 0.2, 0.0, 0.0), 0.0, 2.0))
 
+    def test_components_that_turn_back_are_those_of_all_members(self):
+        swing = {"state": ("q", "v"), "field": lambda t, x, p, i: (x.ball[i].v, -x.ball[i].q)}
+        balls = repeat("ball", 2, **swing, laws=Laws(elastic=("v",)))
+        own = {"state": ("w",), "modes": [Mode("run", lambda t, x, p: (0.0,))]}
+        both = system(balls, **own, laws=Laws(elastic=("w",)))
+        assert both.laws.elastic == ("w", "ball[0].v", "ball[1].v")
+        with pytest.raises(ModelError, match="elastic is a function of the whole state"):
+            system(balls, **own, laws=Laws(elastic=lambda x: x))
+
     def test_an_involution_belongs_to_the_system(self):
         with pytest.raises(ModelError, match="elastic must be names of components of a member"):
             system(cells(laws=Laws(elastic=lambda x: x)))
