@@ -31,6 +31,7 @@ from hybrid.system.given import (
     check_name,
 )
 from hybrid.system.growth import Growth
+from hybrid.system.joined import check_elements, check_joined
 from hybrid.system.laws import Laws, placed
 from hybrid.system.members import shared_name
 from hybrid.system.moving import moving_numbers
@@ -410,49 +411,12 @@ class HybridSystem(Portable):
         return period_at(self.period, self.variables, self.parameter_values(overrides))
 
     def _check_graph(self) -> None:
-        if not self.modes:
-            raise ModelError("HybridSystem: at least one mode is needed; got none.")
-        for what, items, kind in (("mode", self.modes, Mode), ("transition", self.transitions, Transition)):
-            for item in items:
-                if not isinstance(item, kind):
-                    raise ModelError(
-                        f"HybridSystem: each {what} must be a {kind.__name__}; got {arguments.shown(item)}."
-                    )
-            names = [item.name for item in items]
-            if END in names:
-                raise ModelError(
-                    f"HybridSystem: {what} name {END!r} is reserved for the end of a run. Use another name."
-                )
-            twice = sorted({name for name in names if names.count(name) > 1})
-            if twice:
-                raise ModelError(
-                    f"HybridSystem: {what} names must differ; given twice: {', '.join(twice)}. "
-                    f"Give each {what} its own name."
-                )
-        for transition in self.transitions:
-            for end in ("source", "target", "accumulates_to"):
-                name = getattr(transition, end)
-                if name is not None and name not in self.mode_names:
-                    what = f"Transition {transition.name!r}: {end} mode"
-                    raise ModelError(unknown_name(what, name, self.mode_names, "Modes"))
+        check_elements(self.modes, self.transitions)
         if self.start is not None:
             check_mode(self, self.start, "HybridSystem: start mode")
         if self.is_whole:
             # The modes between those of a stage may not have been made yet.
-            self._check_reachable()
-
-    def _check_reachable(self) -> None:
-        """Among several modes, one that no transition enters or leaves is assumed to be a mistake."""
-        linked = set()
-        for transition in self.transitions:
-            ends = {transition.source, transition.target, transition.accumulates_to} - {None}
-            linked |= ends if len(ends) > 1 else set()
-        lonely = [name for name in self.mode_names if name not in linked]
-        if len(self.modes) > 1 and lonely:
-            raise ModelError(
-                f"HybridSystem: no transition joins mode {lonely[0]!r} to the others. Modes: "
-                f"{', '.join(self.mode_names)}. Add a transition, or make it a separate system."
-            )
+            check_joined(self.mode_names, self.transitions)
 
 
 def check_mode(system: HybridSystem, name: object, what: str = "Mode") -> None:
