@@ -319,7 +319,7 @@ class TestNames:
         end = simulate(both, [0.0] * 3, (0.0, 0.4)).end
         given = {"cell.rate": [1.0, 1.5, 2.0]}
         assert simulate(both, end, (0.4, 0.5), parameters=given).status.ok
-        with pytest.raises(ArgumentError, match=r"the end of a run with cell\[0\].rate = 1\.0.*; got 5\.0"):
+        with pytest.raises(ArgumentError, match=r"the end of a run with cell\[0\]\.rate = .*; got"):
             simulate(both, end, (0.4, 0.5), parameters={"cell.rate": 5.0})
 
     def test_results_by_name_of_one_and_of_all(self):
