@@ -116,6 +116,7 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
         )
         for mode, field, around in zip(system.modes, fields, boundaries, strict=True)
     ]
+    on_the_way = (symbols.t, *symbols.x[: system.tangent_dimension])  # where counters stand still
     # The zeros of a clock are known: nothing is asked of it as a function but its gradient.
     clocks = [transition.clock is not None for transition in system.transitions]
     affine = tuple(
@@ -233,8 +234,7 @@ def _emitted(system: HybridSystem, traces: Traces) -> Emitted:
         read_by=readers(system, fields, guards, conditions, resets, symbols),
         keeps_state=tuple(reset.expressions == [*symbols.x] for reset in resets),
         jumping_reset=tuple(
-            reset.expressions is None or has_jumps(reset.expressions, (symbols.t, *symbols.x))
-            for reset in resets
+            reset.expressions is None or has_jumps(reset.expressions, on_the_way) for reset in resets
         ),
         propagators=tuple(map(_without_code, propagators)),
         tangent_start=places.vectors,

@@ -92,7 +92,7 @@ class Places:
         elif fires:
             left, count = [*left[1:], NEVER], count - 1.0
         if begins:
-            left, count = _with(left, wait), count + 1.0
+            left, count = _with(left, wait) if self.is_held else _behind(left, wait, count), count + 1.0
         due = {name: np.where(count > i + 0.5, left[i], 0.0) for i, name in enumerate(self.due)}
         return {self.clock: 0.0, **due, self.count: count, self.busy: _truth(count > 0.5)}
 
@@ -109,6 +109,11 @@ def _without(left: Sequence[Any], gone: Any) -> list[Any]:
                range(1, len(left) + 1), left[i])
         for i in range(len(left))
     ]  # fmt: skip
+
+
+def _behind(left: Sequence[Any], wait: Any, count: Any) -> list[Any]:
+    """The list with one entry more, the last: what waits as long as all others ends after them."""
+    return [np.where(abs(count - i) < 0.5, wait, each) for i, each in enumerate(left)]
 
 
 def _with(left: Sequence[Any], wait: Any) -> list[Any]:

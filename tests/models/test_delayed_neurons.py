@@ -6,6 +6,7 @@ from scipy.optimize import brentq
 
 import hybrid
 from hybrid.testing import Case, check_laws, check_ticks
+from lyapunov import lyapunov_spectrum
 from models import delayed_neurons
 
 DRIVE, WEIGHT = 1.5, -0.2
@@ -56,6 +57,13 @@ def test_excitation_drives_the_neurons_apart():
     given = {"eps": 0.1}
     orbit = hybrid.periodic_orbit(delayed_neurons(), (0.95, 0.95), period=exact, parameters=given)
     assert np.abs(orbit.multipliers).max() == pytest.approx(1.0 - 2.0 * slope, rel=1e-8)
+
+
+def test_the_exponent_of_a_difference_lasts_when_the_neurons_have_met():
+    """Their spikes come to one instant up to rounding, and neither is set off by the other."""
+    found = lyapunov_spectrum(delayed_neurons(), (0.8, 0.3), interval=1.0, intervals=150, transient=10, k=2)
+    exact = np.log(1.0 - 2.0 * period(0.3)[1]) / period(0.3)[0]
+    np.testing.assert_allclose(found.exponents, [0.0, exact], atol=5e-3)
 
 
 def test_laws_and_ticks():

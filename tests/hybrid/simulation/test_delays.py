@@ -459,3 +459,36 @@ def test_a_guess_whose_run_fills_the_places_is_no_orbit():
     """The run from the guess fills the places before as many arrive as leave."""
     found = hybrid.periodic_orbit(relay(places=4), (0.5, 0.0), period=1.0, parameters={"delay": 9.5})
     assert not found.closes
+
+
+def test_a_jump_in_a_counter_does_not_lock_a_jump_beside_it():
+    """Two guards are reached at one instant up to rounding; each reset jumps where a counter passes 1/2."""
+
+    def flag(count):
+        return np.where(count > 0.5, 1.0, 0.0)
+
+    pair = HybridSystem(
+        state=("v", "w"),
+        held=("a", "b"),
+        counters=("n",),
+        modes=[Mode("run", lambda t, x, p: (1.5 - x.v, 1.5 - x.w))],
+        transitions=[
+            Transition(
+                "run",
+                "run",
+                Guard(lambda t, x, p: x.v - 1.0, +1),
+                Reset(lambda t, x, p: {"v": 0.0, "a": flag(x.n)}),
+                name="first",
+            ),
+            Transition(
+                "run",
+                "run",
+                Guard(lambda t, x, p: x.w - 1.0, +1),
+                Reset(lambda t, x, p: {"w": 0.0, "b": flag(x.n)}),
+                name="second",
+            ),
+        ],
+    )
+    for apart in np.arange(20, 60, 2) * 2.2e-16:
+        arc = hybrid.simulate(pair, {"v": 0.3409, "w": 0.3409 + apart}, (0.0, 1.1), tangent=True)
+        assert np.linalg.svd(arc.fundamental[:2, :2], compute_uv=False)[1] > 0.9
