@@ -109,6 +109,7 @@ def test_nothing_is_seen_of_what_is_under_way_but_behind():
     assert values["delay_due0"] - values["delay_clock"] == pytest.approx(4.0 - 3.2, rel=1e-12)
 
 
+@pytest.mark.as_given
 @pytest.mark.parametrize("period", [None, 0.7])
 def test_a_run_goes_on_with_what_is_under_way(period):
     system = attrs.evolve(relay(), period=period)
