@@ -10,11 +10,12 @@ import attrs
 from hybrid import arguments
 from hybrid.errors import ModelError, unknown_name
 from hybrid.system.clocks import Clock
+from hybrid.system.delay import Delay
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.frozen import FrozenMapping
 from hybrid.system.laws import Law, Laws
 from hybrid.system.member_functions import JoinedField, MemberFunction, MemberReset, Part
-from hybrid.system.members import full_name, member_name
+from hybrid.system.members import full_name, member_name, shared_names
 from hybrid.system.outputs import Output
 from hybrid.system.repeat import Repeat
 
@@ -58,7 +59,9 @@ def expanded(system: Any) -> dict[str, Any]:
         "counters": names("counters"),
         "parameters": FrozenMapping(parameters),
         "modes": tuple(_mode(system, mode) for mode in system.modes),
-        "transitions": (*system.transitions, *(t for each, i in members for t in _transitions(each, i))),
+        "transitions": _waiting_for_all(
+            (*system.transitions, *(t for each, i in members for t in _transitions(each, i)))
+        ),
         "units": mapping("units"),
         "angles": mapping("angles"),
         "outputs": FrozenMapping(dict(system.outputs) | _outputs(members)),
@@ -139,6 +142,18 @@ def _transitions(repeated: Repeat, i: int) -> Iterator[Transition]:
         yield attrs.evolve(each, guard=guard, reset=reset, name=name)
 
 
+def _waiting_for_all(transitions: tuple[Transition, ...]) -> tuple[Transition, ...]:
+    """Transitions whose delays wait for those of all members where they name them together."""
+    shared = shared_names(tuple(each.name for each in transitions if isinstance(each, Transition)))
+    found = []
+    for each in transitions:
+        if isinstance(each, Transition) and isinstance(each.guard, Delay):
+            trigger = tuple(name for given in each.guard.trigger for name in shared.get(given, (given,)))
+            each = attrs.evolve(each, guard=attrs.evolve(each.guard, trigger=trigger))
+        found.append(each)
+    return tuple(found)
+
+
 def _clock(repeated: Repeat, i: int, clock: Clock) -> Clock:
     """A clock with the numbers of a member."""
     known = (*repeated.parameters, *repeated.components)
@@ -147,7 +162,14 @@ def _clock(repeated: Repeat, i: int, clock: Clock) -> Clock:
         return _own(repeated, i, quantity, known)
 
     fields = [field.name for field in attrs.fields(type(clock)) if field.init]
-    changed = {}
+    changed: dict[str, Any] = {}
+    if isinstance(clock, Delay):
+        # A member waits for its own transitions, unless another name is written in full.
+        fields.remove("trigger")
+        known_here = {each.name for each in repeated.transitions}
+        changed["trigger"] = tuple(
+            full_name(repeated.name, i, name) if name in known_here else name for name in clock.trigger
+        )
     for name in fields:
         value = getattr(clock, name)
         changed[name] = tuple(map(own, value)) if isinstance(value, tuple) else own(value)

@@ -80,20 +80,7 @@ class Part:
 
     def _of_member(self, t: Any, x: Any, p: Any, i: int) -> list[Any]:
         """The rates of one member in order."""
-        value, member = self.function(t, x, p, i), f"{self.group}[{i}]"
-        if not isinstance(value, Mapping):
-            value = _in_order(member, value, self.names)
-        rates = {plain_name(name): rate for name, rate in value.items()}
-        for name in rates:
-            if name not in self.names:
-                raise ModelError(unknown_name(f"{member}: component", name, self.names, "With a field"))
-        missing = [name for name in self.names if name not in rates]
-        if missing:
-            raise ModelError(
-                f"{member} lacks the rate of {', '.join(missing)}. Return one rate for each of "
-                f"{', '.join(self.names)}."
-            )
-        return [rates[name] for name in self.names]
+        return _rates(f"{self.group}[{i}]", self.function(t, x, p, i), self.names)
 
 
 @attrs.frozen(eq=False)
@@ -111,8 +98,24 @@ class JoinedField(Wrapper):
 
     def __call__(self, t: Any, x: Any, p: Any) -> list[Any]:
         """The rates of all components that have one."""
-        own = [*_in_order("the system", self.own(t, x, p), self.names).values()]
+        own = _rates("the system", self.own(t, x, p), self.names)
         return own + [rate for part in self.parts for rate in part.rates(t, x, p)]
+
+
+def _rates(owner: str, value: Any, names: Sequence[str]) -> list[Any]:
+    """Rates in the order of their names, from a dict or in this order."""
+    if not isinstance(value, Mapping):
+        value = _in_order(owner, value, names)
+    rates = {plain_name(name): rate for name, rate in value.items()}
+    for name in rates:
+        if name not in names:
+            raise ModelError(unknown_name(f"{owner}: component", name, names, "With a field"))
+    missing = [name for name in names if name not in rates]
+    if missing:
+        raise ModelError(
+            f"{owner} lacks the rate of {', '.join(missing)}. Return one rate for each of {', '.join(names)}."
+        )
+    return [rates[name] for name in names]
 
 
 def _in_order(owner: str, value: Any, names: Sequence[str]) -> dict[str, Any]:

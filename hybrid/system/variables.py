@@ -287,9 +287,9 @@ class Variables:
         given = dict.fromkeys((*self.state_names[self.moving :], *self.under_way), 0.0) | given
         missing = [component for component in self.state_names if component not in given]
         if missing:
+            own = [component for component in self.state_names if component not in self.under_way]
             raise ArgumentError(
-                f"{name} lacks {', '.join(missing)}. The state is {', '.join(self.state_names)}; give each a "
-                "number."
+                f"{name} lacks {', '.join(missing)}. The state is {', '.join(own)}; give each a number."
             )
         return given
 

@@ -11,6 +11,7 @@ from hybrid import (
     After,
     ArgumentError,
     At,
+    Delay,
     Every,
     Guard,
     HybridSystem,
@@ -576,3 +577,66 @@ def test_a_chain_is_the_chain_written_by_hand():
     np.testing.assert_allclose(one.jumps.t, other.jumps.t, rtol=1e-11)
     np.testing.assert_allclose(one.x[-1], other.x[-1], rtol=1e-9)
     np.testing.assert_allclose(one.fundamental, other.fundamental, rtol=1e-7, atol=1e-9)
+
+
+def test_delays_of_members_and_of_all():
+    """A wait of each member begins with its own firing; the system counts all that arrive a while later."""
+    cells = repeat(
+        "cell",
+        3,
+        state=("u",),
+        counters=("heard",),
+        parameters={"rate": [1.0, 0.8, 0.5]},
+        field=lambda t, x, p, i: {"u": p.cell[i].rate},
+        transitions=[
+            Transition(
+                "run",
+                "run",
+                Guard(lambda t, x, p, i: x.cell[i].u - 1.0, +1),
+                Reset(lambda t, x, p, i: {"u": 0.0}),
+                name="fire",
+            ),
+            Transition(
+                "run",
+                "run",
+                Delay("fire", lambda p, i: 0.1 * (i + 1)),
+                Reset(lambda t, x, p, i: {"heard": x.cell[i].heard + 1}),
+                name="arrive",
+            ),
+        ],
+    )
+    system = HybridSystem(
+        counters=("all",),
+        state=("z",),
+        repeats=[cells],
+        modes=[Mode("run", lambda t, x, p: {"z": -x.z})],
+        transitions=[
+            Transition(
+                "run", "run", Delay("cell.fire", 0.35), Reset(lambda t, x, p: {"all": x.all + 1}), name="sum"
+            )
+        ],
+    )
+    arc = simulate(system, {"z": 1.0, "cell.u": 0.0}, (0.0, 4.0))
+    with pytest.raises(ArgumentError, match=r"The state is z, cell\[0\].u, .*cell\[2\].heard; give"):
+        simulate(system, {"z": 1.0}, (0.0, 4.0))
+    assert arc.status.ok
+    fired = []
+    for i, rate in enumerate((1.0, 0.8, 0.5)):
+        times = np.arange(1.0 / rate, 4.0 + 1e-9, 1.0 / rate)
+        fired += times.tolist()
+        heard = [jump.t for jump in arc.jumps[f"cell[{i}].arrive"]]
+        later = times + 0.1 * (i + 1)
+        np.testing.assert_allclose(heard, later[later <= 4.0], rtol=1e-12)
+    later = np.sort(np.array(fired) + 0.35)
+    np.testing.assert_allclose([jump.t for jump in arc.jumps["sum"]], later[later <= 4.0], rtol=1e-12)
+
+
+def test_a_field_of_the_system_goes_by_name_beside_members():
+    cells = repeat("cell", 2, state=("u",), field=lambda t, x, p, i: {"u": 1.0})
+    system = HybridSystem(
+        state=("y", "z"), repeats=[cells], modes=[Mode("run", lambda t, x, p: {"z": 2.0, "y": -1.0})]
+    )
+    arc = simulate(system, {"y": 0.0, "z": 0.0, "cell.u": 0.0}, (0.0, 1.0))
+    np.testing.assert_allclose(arc.x[-1], [-1.0, 2.0, 1.0, 1.0], rtol=1e-12)
+    with pytest.raises(ModelError, match="the system lacks the rate of y"):
+        HybridSystem(state=("y", "z"), repeats=[cells], modes=[Mode("run", lambda t, x, p: {"z": 2.0})])
