@@ -14,12 +14,14 @@ from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError, HybridError, ModelError
 from hybrid.expression.table import Table
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
+from hybrid.orbits.continuation.continue_all import continue_all
 from hybrid.orbits.continuation.continue_bifurcation import (
     BifurcationCurve,
     CodimensionTwo,
     continue_bifurcation,
 )
 from hybrid.orbits.continuation.continue_orbit import continue_orbit
+from hybrid.orbits.continuation.diagram import Diagram
 from hybrid.orbits.continuation.saved import open_branch
 from hybrid.orbits.continuation.switch_branch import switch_branch
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation, EquilibriumBranch
@@ -77,6 +79,7 @@ __all__ = [
     "CodimensionTwo",
     "CompiledSystem",
     "Delay",
+    "Diagram",
     "Equilibrium",
     "EquilibriumBifurcation",
     "EquilibriumBranch",
@@ -111,6 +114,7 @@ __all__ = [
     "basin_fractions",
     "basins",
     "compile_system",
+    "continue_all",
     "continue_bifurcation",
     "continue_equilibrium",
     "continue_orbit",

@@ -65,6 +65,10 @@ DEFAULTS = {
     },
     hybrid.continue_bifurcation: {"outputs": None, "solver": None, "max_steps": 500, "progress": None},
     hybrid.equilibrium: {"mode": None, "parameters": None, "max_iterations": 60},
+    hybrid.continue_all: {
+        **{"depth": 2, "most": 50, "outputs": None},
+        **{"solver": None, "max_steps": 2000, "progress": None},
+    },
     hybrid.continue_equilibrium: {"max_steps": 2000, "progress": None},
     hybrid.open_branch: {},
     hybrid.open_end: {},
@@ -133,6 +137,7 @@ DEFAULTS = {
     hybrid.plot.plot_jumps: FIGURE,
     hybrid.plot.plot_branch: {"y": 0, "over": None, "label": None, **FIGURE},
     hybrid.plot.plot_curve: FIGURE,
+    hybrid.plot.plot_diagram: {"y": 0, "over": None, **FIGURE},
     hybrid.plot.plot_orbit: {"x": 0, "y": None, **FIGURE},
     hybrid.plot.plot_phase: FIGURE,
     hybrid.plot.plot_section: {"x": 0, "y": None, "size": None, **FIGURE},

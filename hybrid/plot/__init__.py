@@ -12,13 +12,14 @@ from typing import Any
 from hybrid import arguments
 from hybrid.orbits.continuation.branch import Branch
 from hybrid.orbits.continuation.continue_bifurcation import BifurcationCurve
+from hybrid.orbits.continuation.diagram import Diagram
 from hybrid.orbits.equilibria.branch import EquilibriumBranch
 from hybrid.orbits.equilibria.curves import EquilibriumCurve
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.sections import Section
 from hybrid.plot.arcs import plot_arc, plot_phase
 from hybrid.plot.basins import plot_basins, plot_fractions
-from hybrid.plot.branches import plot_branch, plot_curve
+from hybrid.plot.branches import plot_branch, plot_curve, plot_diagram
 from hybrid.plot.datasets import plot_ends, plot_sweep
 from hybrid.plot.graph import plot_graph
 from hybrid.plot.jumps import plot_global_error, plot_jumps
@@ -38,6 +39,7 @@ __all__ = [
     "plot_basins",
     "plot_branch",
     "plot_curve",
+    "plot_diagram",
     "plot_ends",
     "plot_fractions",
     "plot_global_error",
@@ -94,6 +96,7 @@ drawn.register(HybridArc, plot_arc)
 drawn.register(Branch, plot_branch)
 drawn.register(EquilibriumBranch, plot_branch)
 drawn.register(EquilibriumCurve, plot_curve)
+drawn.register(Diagram, plot_diagram)
 drawn.register(list, plot_branch)
 drawn.register(tuple, plot_branch)
 drawn.register(BifurcationCurve, plot_curve)

@@ -13,6 +13,7 @@ from hybrid.display.tables import with_unit
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Branch
 from hybrid.orbits.continuation.continue_bifurcation import BifurcationCurve
+from hybrid.orbits.continuation.diagram import Diagram
 from hybrid.orbits.equilibria.branch import EquilibriumBranch
 from hybrid.orbits.equilibria.curves import EquilibriumCurve
 from hybrid.orbits.labelled import table_at
@@ -229,6 +230,61 @@ def _with_bifurcations(branch: AnyBranch, name: str) -> tuple[np.ndarray, np.nda
         np.insert(branch.stable, at, stable),
         np.insert(admissible, at, onward),
     )
+
+
+def plot_diagram(
+    diagram: Diagram,
+    y: str | int = 0,
+    *,
+    over: xarray.Dataset | Axes | None = None,
+    ax: Axes | None = None,
+    figsize: tuple[float, float] | None = None,
+) -> Axes:
+    """Draw all branches of a diagram into one picture, each in a colour of its own; as :func:`plot_branch`.
+
+    Parameters
+    ----------
+    diagram
+        From :func:`hybrid.continue_all`.
+    y
+        Name or index of a component, name of an output, or name of a function in ``outputs=`` of
+        :func:`hybrid.continue_all`. Where that is a maximum, a minimum or a mean of ``hybrid.measures``, an
+        equilibrium is drawn at the value itself; at other functions only orbits are drawn.
+    over, ax, figsize
+        As for :func:`plot_branch`.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Examples
+    --------
+    >>> import hybrid, models
+    >>> from hybrid.measures import maximum
+    >>> from hybrid.plot import plot_diagram
+    >>> rest = hybrid.equilibrium(models.relief_valve(), (2.5, 0.0, 12.5))
+    >>> diagram = hybrid.continue_all(rest, "q", (8.0, 9.0), outputs={"top": maximum("y")})
+    >>> ax = plot_diagram(diagram, "top")
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('q', 'top')
+    """
+    arguments.instance("diagram", diagram, Diagram, "Make one with hybrid.continue_all.")
+    shown: list[tuple[AnyBranch, Any]] = []
+    for each in diagram:
+        name: Any = y
+        if isinstance(each, EquilibriumBranch) and y in diagram.outputs:
+            measure = diagram.outputs[str(y)]
+            if getattr(measure, "kind", None) not in ("maximum", "minimum", "mean"):
+                continue
+            name = measure.name
+        shown.append((each, name))
+    (ax,) = axes_for(ax, 1, (6.4, 4.2), figsize)
+    for i, (branch, name) in enumerate(shown):
+        plot_branch(branch, name, over=None if i else over, ax=ax)
+    for branch, _ in shown:
+        if isinstance(branch, Branch):
+            ax.set_ylabel(_label_of(branch, _quantity_of(branch, y)))
+    return ax
 
 
 def plot_curve(

@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.orbits.continuation.passing import Pass
-from hybrid.orbits.continuation.place import Place
+from hybrid.orbits.continuation.place import Place, moment, share_of
 from hybrid.system.periodicity import whole_turns
 
 # Parts of an orbit are the same if they differ by this share of its size.
 SAME = 1e-7
+# An orbit that does not jump is asked whether it is one that is passed so often at most.
+MOST_PASSES = 8
 
 Names = tuple[tuple[tuple[str, ...], str], ...]
 
@@ -84,7 +86,17 @@ def halves(orbit: Pass, count: int = 2) -> np.ndarray | None:
     return np.asarray(((x[part:] - x[:-part]) / orbit.scale).ravel())
 
 
+def _returns(orbit: Pass, count: int) -> bool:
+    """Whether an orbit that does not jump is back after such a part of its period."""
+    loop = orbit.loop
+    _, x = moment(orbit, *share_of(orbit, float(loop.times[0] + loop.period / count)))
+    away = (x - orbit.whole(0, loop.x[0]))[: orbit.family.n] / orbit.scale
+    return bool(np.linalg.norm(away) <= SAME)
+
+
 def is_repeated(orbit: Pass) -> bool:
     """Whether it is a shorter orbit that is passed more than once."""
+    if not any(stretch.fired for stretch in orbit.family.route):
+        return not orbit.is_point and any(_returns(orbit, count) for count in range(2, MOST_PASSES + 1))
     parts = (halves(orbit, count) for count in range(2, len(instants_of(orbit)[0]) + 1))
     return any(each is not None and np.linalg.norm(each) <= SAME for each in parts)
