@@ -91,11 +91,14 @@ def has_delays(transitions: Sequence[Transition]) -> bool:
     return any(isinstance(getattr(each, "guard", None), Delay) for each in transitions)
 
 
-def check_triggers(transitions: Sequence[Transition]) -> None:
-    """ModelError if a transition that was put into a made system should begin waits, and cannot.
+def check_under_way(names: Sequence[str], state: Sequence[str], transitions: Sequence[Transition]) -> None:
+    """ModelError if what is under way has no component, or a new transition should begin waits, and cannot.
 
     Resets begin waits. Those of the library do so: they are made of others that do.
     """
+    unknown = [name for name in names if name not in state]
+    if unknown:
+        raise ModelError(unknown_name("HybridSystem: under_way: component", unknown[0], state, STATE))
     named = {each.name: each for each in transitions}
     for each in transitions:
         clock = each.guard

@@ -26,7 +26,11 @@ def as_transitions(value: Iterable[Transition]) -> tuple[Transition, ...]:
 
 def as_under_way(value: Any) -> tuple[str, ...]:
     """Names of components as a tuple."""
-    return tuple(arguments.items("HybridSystem: under_way", value, "be left out: a Delay gives it"))
+    wanted = "be left out: a Delay gives it"
+    names = tuple(arguments.items("HybridSystem: under_way", value, wanted))
+    if isinstance(value, str) or not all(isinstance(name, str) for name in names):
+        raise arguments.refusal("HybridSystem: under_way", wanted, value)
+    return names
 
 
 def as_listed_order(value: object) -> bool:

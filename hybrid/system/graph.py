@@ -13,7 +13,7 @@ import numpy as np
 from hybrid import arguments
 from hybrid.errors import ModelError, unknown_name
 from hybrid.system.checks import check_angles, check_functions
-from hybrid.system.delayed import check_triggers, has_delays, written_out
+from hybrid.system.delayed import check_under_way, has_delays, written_out
 from hybrid.system.described import described, described_in_html
 from hybrid.system.elements import END, Mode, Transition
 from hybrid.system.expansion import as_repeats, expanded
@@ -201,7 +201,7 @@ class HybridSystem(Portable):
         if has_delays(self.transitions):
             self._write_out_delays()
         elif self.under_way:
-            check_triggers(self.transitions)
+            check_under_way(self.under_way, self.state_names, self.transitions)
         check_outputs(self.outputs, self.variables)
         object.__setattr__(self, "units", self.variables.as_units(self.units, self.outputs))
         self._check_graph()

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 import hybrid
-from hybrid import After, At, Every, Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import After, At, Delay, Every, Guard, HybridSystem, Mode, Reset, Transition
 from tests.hybrid.arguments.values import (
     ANGLES,
     BALL,
@@ -140,6 +140,7 @@ def systems():
                 "outputs": OUTPUTS,
                 "laws": [None, *FUNCTION, {}, Odd()],
                 "notes": [None, "a", 3, [1], [None], Odd()],
+                "under_way": [None, "a", 3, [1], [None], ["a"], Odd()],
                 "growth": [*FUNCTION, {}, HybridSystem, BALL, Odd()],
                 "derived_from": [None, *FUNCTION, {}, HybridSystem, BALL, Odd()],
             },
@@ -169,6 +170,15 @@ def systems():
             {"times": [*QUANTITY[:-2], [], [math.nan]], "when": FUNCTION, "columns": COLUMNS, **DATED},
         ),
         (call(After, 1.0), {"duration": QUANTITY, "when": FUNCTION, "restarts": FLAG}),
+        (
+            call(Delay, "a", 1.0),
+            {
+                "trigger": [None, 3, [], [1], [None], "", Odd()],
+                "duration": [each for each in QUANTITY if each != 0.0],
+                "places": [None, "a", 0, -1, 1.5, 101, math.nan, Odd()],
+                "when": FUNCTION,
+            },
+        ),
         (call(Reset, lambda t, x, p: x), {"function": [None, *FUNCTION], "jacobian": FUNCTION}),
         (
             call(Transition, "a", "a", Guard(lambda t, x, p: x.q)),
