@@ -107,6 +107,8 @@ def filippov(
     ('sliding', 'sliding->below', 2.5)
     """
     state, parameters = as_state(state), as_parameters(parameters)
+    if not state:
+        raise ModelError("filippov: state needs at least one component; got an empty sequence.")
     for what, function in (("below", below), ("above", above), ("switching", switching)):
         if not callable(function):
             raise ModelError(f"filippov: {what} must be a function of (t, x, p); got {shown(function)}.")

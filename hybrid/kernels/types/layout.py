@@ -243,8 +243,8 @@ class Run(Structure, counters=COUNTERS, numbers=NUMBERS):
     - ``tick (transitions,)``: the number of the next tick of each transition; ``ticked (transitions,)``: that
       of the first tick of a clock that has not fired anything yet. ``ticks`` are the numbers of all
       clocks, those of a transition from ``model.first_tick`` on: period and offset, or times in order, or a
-      duration. ``rows`` are the places of the times before they were put in order, ``row`` that of the last
-      to fire.
+      duration, or the times left of what is under way and how far a tick of these may be behind. ``rows`` are
+      the places of the times before they were put in order, ``row`` that of the last to fire.
       The mode was entered in the period ``entry_cycle`` at ``entry_phase``, and ``entry_low`` of rounding;
       the same three numbers of the ``arrival`` tell when it was entered from another mode, and those of the
       ``reading`` when the numbers of clocks that resets may change were last read.

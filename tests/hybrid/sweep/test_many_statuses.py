@@ -136,6 +136,19 @@ HALF = HybridSystem(
 DRAINED = "may be off by 0.6"
 BEYOND = "The start lies beyond the guard of"
 CASES = {
+    "a delay without a place": Case(
+        alone(
+            lambda t, x, p: (1.0,),
+            Transition(
+                "m", "m", Guard(lambda t, x, p: x.x - 1.0, +1), Reset(lambda t, x, p: {"x": 0.0}), name="send"
+            ),
+            Transition("m", "m", Delay("send", 2.5, places=2), name="get"),
+        ),
+        (0.0,),
+        5.0,
+        StatusCode.DELAY_FULL,
+        "places",
+    ),
     "plain": Case(ball(), (1.0, 0.0), 0.1, StatusCode.SUCCESS, "Reached the end."),
     "beyond": Case(ball(), (-1.0, 0.0), 0.1, StatusCode.START_BEYOND, BEYOND, {"mode": "flight"}),
     "beyond, and crossed later": Case(
