@@ -272,8 +272,8 @@ def plot_diagram(
     shown: list[tuple[AnyBranch, Any]] = []
     for each in diagram:
         name: Any = y
-        if isinstance(each, EquilibriumBranch) and y in diagram.outputs:
-            measure = diagram.outputs[str(y)]
+        if isinstance(each, EquilibriumBranch) and isinstance(y, str) and y in diagram.outputs:
+            measure = diagram.outputs[y]
             if getattr(measure, "kind", None) not in ("maximum", "minimum", "mean"):
                 continue
             name = measure.name

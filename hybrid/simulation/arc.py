@@ -313,13 +313,13 @@ class HybridArc(Asked):
             raise ArgumentError(
                 f"t must lie in the run, [{self.t[0]}, {self.t[-1]}]; got {times.min()} to {times.max()}."
             )
-        states, modes = self.states_and_modes(inside.ravel())
+        states, modes = self._dense(inside.ravel())
         if name is None:
             return states.reshape(*times.shape, self.system.dimension)
         found = values_of(self.system, name, inside.ravel(), states, modes, self._values)
         return found.reshape(times.shape + found.shape[1:])
 
-    def states_and_modes(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _dense(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """States ``(N, n)`` and indices of the modes ``(N,)`` at times in the run."""
         assert self._pieces is not None
         if len(self._pieces.t) == 0:

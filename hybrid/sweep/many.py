@@ -243,7 +243,7 @@ class _OneByOne:
                 continue
             reached = found.times[found.times <= arc.t[-1]]
             modes = np.array([found.mode_index(name) for name in arc.system.mode_names])
-            found.states[i, : len(reached)], places = arc.states_and_modes(reached)
+            found.states[i, : len(reached)], places = arc._dense(reached)
             found.modes[i, : len(reached)] = modes[places]
             found.states[i, -1], found.t_end[i] = arc.x[-1], arc.t[-1]
             found.modes[i, -1], found.jumps[i] = found.mode_index(str(arc.mode[-1])), arc.jump_count

@@ -16,7 +16,7 @@ from hybrid.orbits.continuation.continue_orbit import continue_orbit
 from hybrid.orbits.continuation.diagram import Diagram, Origin
 from hybrid.orbits.continuation.same import is_known
 from hybrid.orbits.continuation.switch_branch import switch_branch
-from hybrid.orbits.continuation.watch import OfArc
+from hybrid.orbits.continuation.watch import OfArc, checked_outputs
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation, EquilibriumBranch
 from hybrid.orbits.equilibria.continue_equilibrium import continue_equilibrium
 from hybrid.orbits.equilibria.equilibrium import Equilibrium
@@ -96,7 +96,7 @@ def continue_all(
     depth, most = arguments.count("depth", depth, 0), arguments.count("most", most, 1)
     progress = None if progress is None else arguments.flag("progress", progress)
     method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
-    walker = _Walker(parameter, span, outputs or {}, method, max_steps)
+    walker = _Walker(parameter, span, checked_outputs(outputs, starts[0].system), method, max_steps)
     waiting: deque[tuple[Start, int, Origin | None]] = deque((each, 0, None) for each in starts)
     stopped = False
     with progress_bar(None, "Diagram", progress, "branch") as bar:

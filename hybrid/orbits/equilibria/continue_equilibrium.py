@@ -106,7 +106,8 @@ def continue_equilibrium(
         raise ArgumentError(f"point has not converged: {point.status.message}")
     arguments.known("parameter: Parameter", parameter, point.system.parameters, "Parameters")
     ends = arguments.numbers("span", span, "be (low, high)")
-    if ends.shape != (2,) or not np.all(np.isfinite(ends)):
+    # The range is a unit: its square has to be a number.
+    if ends.shape != (2,) or not np.all(np.abs(ends) < 1e150):
         raise arguments.refusal("span", "be (low, high)", span)
     low, high = ends.tolist()
     value = point.parameters[parameter]

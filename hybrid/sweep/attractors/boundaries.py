@@ -186,8 +186,13 @@ def uncertainty_exponent(
 
 def _labels(found: Any) -> np.ndarray:
     """Labels as an array of whole numbers."""
-    values = found["label"].values if hasattr(found, "data_vars") and "label" in found.data_vars else found
-    labels = np.asarray(values)
+    values = found
+    if hasattr(found, "data_vars") and "label" in found.data_vars:
+        values = found["label"].values
+    try:
+        labels = np.asarray(values if isinstance(values, np.ndarray | list | tuple) else [])
+    except ValueError:
+        labels = np.empty(0)
     if labels.dtype.kind not in "iu" or not labels.ndim or not labels.size:
         raise arguments.refusal("found", "be a dataset of basins, or an array of labels", found)
     return labels

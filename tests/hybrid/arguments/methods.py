@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 import hybrid
 import lyapunov
 from hybrid import HybridSystem, measures
@@ -19,6 +21,7 @@ from tests.hybrid.arguments.values import (
     PARAMETERS,
     POSITIVE,
     SOLVER,
+    STATE,
     SYSTEM,
     Hostile,
     Odd,
@@ -28,6 +31,60 @@ from tests.hybrid.arguments.values import (
 # Functions of an arc by name that are none, and a name that is no text.
 OF_ARC = ["a", 3, [abs], {"y": 3}, {"y": None}, {3: abs}, {"": abs}, Odd()]
 NAMED = [each for each in NAME if not isinstance(each, str)]
+
+
+def equilibria(made):
+    """Equilibria, their branches and curves, and whole diagrams."""
+    index = {"i": [None, "a", 1.5, 10**9, True]}
+    kinds = {"kinds": [None, *NAME, (), ["fold", 3], ["flop"]]}
+    span = [None, 3, (12.0, 13.0), (9.5, 8.0), (9.0,), "ab"]
+    labels = np.ones((4, 4), dtype=int)
+    no_labels = [None, "a", 3, 1.5, np.ones((3, 3)), made["branch"]]
+    return [
+        (
+            call(hybrid.equilibrium, BALL, (1.0, 0.0), mode="rest"),
+            {
+                "system": SYSTEM,
+                "x0": STATE,
+                "mode": NAME,
+                "parameters": OF_BALL,
+                "max_iterations": COUNT,
+            },
+        ),
+        (
+            call(hybrid.continue_equilibrium, made["rest"], "q", (8.9, 9.1)),
+            {
+                "point": [None, "a", 3, BALL, made["orbit"]],
+                "parameter": [None, *NAME],
+                "span": span,
+                "max_steps": [0, *COUNT],
+                "progress": [3, "a"],
+            },
+        ),
+        (call(hybrid.EquilibriumBranch.equilibrium, made["rests"], 0), index),
+        (call(hybrid.EquilibriumBranch.of, made["rests"], "Hopf"), kinds),
+        (call(hybrid.EquilibriumCurve.equilibrium, made["hopfs"], 0), index),
+        (
+            call(hybrid.continue_all, made["rest"], "q", (8.9, 9.1)),
+            {
+                "start": [None, "a", 3, BALL, []],
+                "parameter": [None, *NAME],
+                "span": span,
+                "depth": COUNT,
+                "most": [0, *COUNT],
+                "outputs": OF_ARC,
+                "solver": SOLVER,
+                "max_steps": [0, *COUNT],
+                "progress": [3, "a"],
+            },
+        ),
+        (call(hybrid.Diagram.of, made["diagram"], "Hopf"), kinds),
+        (call(hybrid.basin_entropy, labels, size=2), {"found": no_labels, "size": [0, *COUNT]}),
+        (
+            call(hybrid.uncertainty_exponent, 1 + (np.indices((40, 40))[0] > 19), sizes=[1, 2]),
+            {"found": no_labels, "sizes": [3, "a", [0], [1.5], ["a"], [100], Odd()]},
+        ),
+    ]
 
 
 def methods(made):
@@ -91,6 +148,7 @@ def methods(made):
                 "progress": [3, "a"],
             },
         ),
+        *equilibria(made),
         (
             call(hybrid.open_branch, made["branch"].system, made["branch"].to_xarray()),
             {"system": [None, 3, "a"], "saved": [None, 3, "no such folder", made["flip"]]},

@@ -31,6 +31,7 @@ LAWS = {
     "balance": [*BY_NAME, {"a": abs}, {"a": (abs, 3)}],
     "continuous": [3, [3], [None]],
     "elastic": ["nope", 3, ["nope"], [3], [None]],
+    "alike": [3, [3], [None], ["nope"]],
 }
 OF_SYSTEMS = ("check_system", "check_reads", "check_dimensions")
 
@@ -71,7 +72,7 @@ def checks():
             if name.startswith("check_") and name not in (*OF_SYSTEMS, "check_elastic")
         ),
         (call(hybrid.Laws.joined, hybrid.Laws(), hybrid.Laws()), {"other": [None, "a", 3, {}, BALL]}),
-        (call(hybrid.Laws), LAWS | {"elastic": ["nope", 3, [3], [None]]}),
+        (call(hybrid.Laws), LAWS | {"elastic": ["nope", 3, [3], [None]], "alike": [3, [3], [None]]}),
         *((call(getattr(hybrid.testing, name), BALL), {"system": SYSTEM}) for name in OF_SYSTEMS[1:]),
         (
             call(hybrid.testing.check_elastic, case, ["v"]),
@@ -85,6 +86,8 @@ def checks():
 
 def laws():
     return [
+        (call(models.interleaved_converter, 2), {"phases": [0, *COUNT]}),
+        (call(models.pulse_coupled_neurons, 2), {"count": [0, *COUNT]}),
         (call(models.dosing_schedule), {"times": [*QUANTITY[:-2], [], [math.nan]]}),
         (call(models.infusion_schedule), {"frame": [*LIST, [], {"t": []}]}),
         (call(models.vibroimpact), {"contact": ["a", 3, 0, False, contact.Rigid, Odd()]}),

@@ -80,6 +80,17 @@ def plots(made):
             {"curve": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE},
         ),
         (
+            call(hybrid.plot.plot_diagram, made["diagram"]),
+            {
+                "diagram": [None, "a", 3, arc],
+                # The model has three components.
+                "y": [each for each in COMPONENT if type(each) is not int or not -4 < each < 3],
+                "over": AXES[1:],
+                "ax": AXES,
+                "figsize": FIGSIZE,
+            },
+        ),
+        (
             call(hybrid.plot.plot_work_precision, made["work"]),
             {
                 "result": [None, "a", 3, BALL],

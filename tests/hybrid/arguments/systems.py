@@ -9,6 +9,7 @@ from hybrid import After, At, Delay, Every, Guard, HybridSystem, Mode, Reset, Tr
 from tests.hybrid.arguments.values import (
     ANGLES,
     BALL,
+    COUNT,
     FLAG,
     FUNCTION,
     GUARD,
@@ -32,6 +33,7 @@ BAD_STATES = [
 # Plain numbers have neither.
 DATED = {"unit": [3, True, "h", Odd()], "origin": [3, True, "2024-01-31", Odd()]}
 COLUMNS = [3, "a", [1.0], {"a": [1.0]}, {"a": 1.0}, Odd()]
+REPEATS = [None, "a", 3, [3], ["a"], [None], {"cell": 3}, Odd()]
 MEMORY = [None, "u", 1, True, ("1u",), ("u", "u"), (1,), {"u"}, [["u"]], Odd()]
 
 
@@ -67,6 +69,7 @@ def systems():
                 "units": UNITS,
                 "angles": ANGLES,
                 "modes": CALLED,
+                "repeats": REPEATS,
                 "outputs": OUTPUTS,
                 "laws": [*FUNCTION, {}, Odd()],
             },
@@ -143,6 +146,33 @@ def systems():
                 "under_way": [None, "a", 3, [1], [None], ["a"], Odd()],
                 "growth": [*FUNCTION, {}, HybridSystem, BALL, Odd()],
                 "derived_from": [None, *FUNCTION, {}, HybridSystem, BALL, Odd()],
+                "repeats": REPEATS,
+            },
+        ),
+        (
+            call(
+                hybrid.repeat,
+                "cell",
+                2,
+                state=("u",),
+                field=lambda t, x, p, i: (1.0,),
+                transitions=[
+                    Transition("run", "run", Guard(lambda t, x, p, i: x.cell[i].u - 1.0), name="fire")
+                ],
+            ),
+            {
+                "name": [None, *TEXT, "", "1a", "a b"],
+                "count": [0, *COUNT],
+                "state": [*BAD_STATES[:6], ("1q",), (1, 2)],
+                "held": [None, 1, True, ("1u",), (1,), [["u"]], Odd()],
+                "counters": [None, 1, True, ("1u",), (1,), [["u"]], Odd()],
+                "parameters": [[1], "a", 3, {"e": "1"}, {"e": math.nan}, {"e": [1.0]}, {"e": True}, {3: 1.0}],
+                "field": [None, 3, "a", {"run": 3}, lambda t, x, p: (1.0,), Odd()],
+                "transitions": [*LIST, [1], ["a"]],
+                "units": [3, "a", {"nope": "m"}, Odd()],
+                "angles": [3, "a", {"nope": 1.0}, Odd()],
+                "outputs": [3, "a", {"a": 3}, {3: abs}, Odd()],
+                "laws": [*FUNCTION, {}, Odd()],
             },
         ),
         (

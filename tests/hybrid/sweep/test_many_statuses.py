@@ -9,6 +9,7 @@ import pytest
 import models
 from hybrid import (
     DOP853,
+    Delay,
     Guard,
     HybridError,
     HybridSystem,
