@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import attrs
+import numpy as np
 
 from hybrid import arguments
 from hybrid.display.progress import progress_bar
@@ -173,7 +174,13 @@ class _Walker:
         """Whether a branch was found at a bifurcation."""
         origin = self.origins[i]
         near = SAME_VALUE * abs(self.span[1] - self.span[0])
-        return origin is not None and abs(origin.bifurcation.value - each.value) <= near
+        if origin is None or abs(origin.bifurcation.value - each.value) > near:
+            return False
+        one, other = origin.bifurcation, each
+        if not (isinstance(one, EquilibriumBifurcation) and isinstance(other, EquilibriumBifurcation)):
+            return True
+        sizes = np.abs(one.equilibrium.x) + np.abs(other.equilibrium.x)
+        return bool(np.all(np.abs(one.equilibrium.x - other.equilibrium.x) <= SAME_VALUE * sizes.max()))
 
     def diagram(self, left: int, stopped: bool) -> Diagram:
         """All that was followed."""

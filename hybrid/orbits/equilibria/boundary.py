@@ -10,6 +10,8 @@ from hybrid.orbits.equilibria.equations import ON_IT, Barrier, Equations, Reduce
 
 # The rates of another mode are zero at a boundary if they are to this share of their terms.
 ZERO = 1e-8
+# Directions in which the rates of a mode do not change.
+SINGULAR = 1e-10
 
 
 @attrs.frozen(eq=False)
@@ -36,14 +38,19 @@ class Neighbour:
 def neighbour_of(equations: Equations, u: np.ndarray, sizes: np.ndarray) -> Neighbour | None:
     """The equilibrium of a mode at a point where its rates are zero.
 
-    None if it is singular there, or excluded. The unknowns have rounding errors of these ``sizes``.
+    None if it does not go on from there, as at a fold, or is excluded. The unknowns have rounding errors of
+    these ``sizes``.
     """
     rows = reduced(equations, u).jacobian(u)
-    try:
-        onward = np.append(np.linalg.solve(rows[:, :-1], -rows[:, -1]), 1.0)
-    except np.linalg.LinAlgError:
+    if not np.isfinite(rows).all():
         return None
-    if not np.isfinite(onward).all():
+    # The least motion, where equilibria are not alone, as those of a mass at rest.
+    scaled = rows * sizes
+    lengths = np.linalg.norm(scaled, axis=1)
+    scaled = scaled / np.where(lengths == 0.0, 1.0, lengths)[:, None]
+    moved = np.linalg.lstsq(scaled[:, :-1], -scaled[:, -1], rcond=SINGULAR)[0]
+    onward = np.append(moved, 1.0) * sizes / sizes[-1]
+    if np.any(np.abs(rows @ onward) > ZERO * (np.abs(rows) @ sizes) / sizes[-1]):
         return None
     known, sides = equations.known(u), {1, -1}
     for barrier in equations.barriers:

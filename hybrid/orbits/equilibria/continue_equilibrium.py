@@ -18,7 +18,7 @@ from hybrid.orbits.equilibria.branch import EquilibriumBifurcation, EquilibriumB
 from hybrid.orbits.equilibria.curve import Spot, spot_at, walk, zero_between
 from hybrid.orbits.equilibria.equations import Barrier, Equations, Reduced, reduced, sizes_of
 from hybrid.orbits.equilibria.equilibrium import Equilibrium, described, eigenvalues_of, is_stable
-from hybrid.orbits.equilibria.normal_forms import branch_point_near, critical_pair, fold_at, hopf_at
+from hybrid.orbits.equilibria.normal_forms import Hopf, branch_point_near, critical_pair, fold_at, hopf_at
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.status import SUCCESS, Status, StatusCode
 
@@ -29,10 +29,16 @@ ENDS = {
     "most": "the limit of steps",
     "lost": "a point beyond which Newton's method finds none",
 }
+# A test function is zero at a start below this.
+AT_ONE = 1e-9
 # Equilibria come in families where a singular value is below this share of the largest.
 FAMILY = 1e-10
 # The real part of a pair at a Hopf point, as a share of its imaginary part, at most.
 ON_THE_AXIS = 1e-6
+# A step is halved so often at most in the search for bifurcations.
+DEEPEST = 5
+# A walk whose start is on a bifurcation begins this far from it, in units of the branch.
+ASIDE = 3e-3
 
 
 def continue_equilibrium(
@@ -134,7 +140,7 @@ def _both_ways(
     equations: Equations, low: float, high: float, most: int, bar: Progress
 ) -> tuple[list[Item], list[str]]:
     """The points and bifurcations of a branch in order, and why it ends on either side."""
-    begin = _first(equations, high - low)
+    begin = _aside(equations, _first(equations, high - low), low, high)
     items: list[Item] = [begin]
     why: list[str] = []
     for sign in (-1.0, 1.0):
@@ -169,17 +175,32 @@ def _first(equations: Equations, reach: float) -> Spot:
     scaled = rows * units
     lengths = np.linalg.norm(scaled, axis=1)
     values = np.linalg.svd(scaled / np.where(lengths == 0.0, 1.0, lengths)[:, None], compute_uv=False)
-    if n and values[-1] <= FAMILY * values[0]:
-        raise ArgumentError(
-            f"point is one of a family: other equilibria of mode {equations.mode!r} are beside it at the "
-            "same parameters, so there is no branch over one. Hold what tells them apart (held=), or choose "
-            "a mode in which the equilibrium is alone."
-        )
     spot = spot_at(part, u, units, np.eye(n + 1)[n])
     if spot is None or spot.tangent[n] == 0.0:
         _, _, right = np.linalg.svd(scaled)
         spot = spot_at(part, u, units, right[-1])
-    assert spot is not None, "a regular point has a tangent"
+    assert spot is not None, "the last singular vector is a direction"
+    if n and values[-1] <= FAMILY * values[0]:
+        # Where two branches cross there is one alone beside; in a family there are others everywhere.
+        made = spot.step(ASIDE)
+        if made is None or abs(_branch_point(made[0])) <= FAMILY:
+            raise ArgumentError(
+                f"point is one of a family: other equilibria of mode {equations.mode!r} are beside it at "
+                "the same parameters, so there is no branch over one. Hold what tells them apart (held=), or "
+                "choose a mode in which the equilibrium is alone."
+            )
+    return spot
+
+
+def _aside(equations: Equations, spot: Spot, low: float, high: float) -> Spot:
+    """A point of the branch beside a start that is on a bifurcation; the start itself if it is on none."""
+    known = equations.known(spot.u)
+    on_it = any(each.height_beside(known, spot.units) == 0.0 for each in equations.barriers)
+    on_it |= any(abs(function(spot)) <= AT_ONE for function in TESTS.values())
+    for length in (ASIDE, -ASIDE) if on_it else ():
+        made = spot.step(length)
+        if made is not None and low <= made[0].u[-1] <= high and abs(_branch_point(made[0])) > AT_ONE:
+            return made[0]
     return spot
 
 
@@ -194,11 +215,43 @@ def _renewed(equations: Equations, spot: Spot) -> Spot:
     assert isinstance(spot.system, Reduced)
     units = np.maximum(spot.units, np.append(np.abs(spot.u[:-1]), 0.0))
     part = Reduced(equations, equations.basis(spot.u, spot.system.basis))
-    return spot_at(part, spot.u, units, spot.tangent * spot.units / units) or spot
+    return spot_at(part, spot.u, units, spot.tangent * spot.units / units, spot.scales) or spot
 
 
-def _between(equations: Equations, spot: Spot, after: Spot) -> list[Item]:
-    """The bifurcations between two points, in order."""
+def _between(equations: Equations, spot: Spot, after: Spot, depth: int = 0) -> list[Item]:
+    """The bifurcations between two points, in order.
+
+    A step over which an eigenvalue or a guard may have passed zero and come back is looked at in parts.
+    """
+    if depth < DEEPEST and _may_pass_twice(equations, spot, after):
+        made = spot.step(0.5 * spot.distance(after))
+        if made is not None:
+            middle = made[0]
+            return [
+                *_between(equations, spot, middle, depth + 1),
+                *_between(equations, middle, after, depth + 1),
+            ]
+    return _in_a_part(equations, spot, after)
+
+
+def _may_pass_twice(equations: Equations, spot: Spot, after: Spot) -> bool:
+    """Whether something is as near to zero at both ends as it moves between them, or two things pass it."""
+    one, other = (eigenvalues_of(equations.within(each.u)) for each in (spot, after))
+    moved = np.abs(one.real - other.real)
+    near = np.minimum(np.abs(one.real), np.abs(other.real)) < 2.0 * moved
+    same = near & (np.sign(one.real) == np.sign(other.real))
+    passed = int(np.sum((one.real > 0.0) != (other.real > 0.0)))
+    if np.any(same & (moved > 0.0)) or passed > (2 if np.any(one.imag != 0.0) else 1):
+        return True
+    for barrier in equations.barriers:
+        heights = [barrier.height_beside(equations.known(each.u), each.units) for each in (spot, after)]
+        if min(map(abs, heights)) < 2.0 * abs(heights[0] - heights[1]) and heights[0] * heights[1] > 0.0:
+            return True
+    return False
+
+
+def _in_a_part(equations: Equations, spot: Spot, after: Spot) -> list[Item]:
+    """The bifurcations between two points, of each kind one at most, in order."""
     found: list[Found] = []
     changed = [kind for kind, function in TESTS.items() if _changes(function, spot, after)]
     if "branch point" in changed and "fold" in changed:
@@ -271,7 +324,7 @@ def _crossing(spot: Spot, after: Spot) -> Spot | None:
     assert isinstance(spot.system, Reduced)
     ends = [_branch_point(spot), _branch_point(after)]
     share = ends[0] / (ends[0] - ends[1])
-    u = branch_point_near(spot.system, spot.u + share * (after.u - spot.u), spot.units)
+    u = branch_point_near(spot.system, spot.u + share * (after.u - spot.u), spot.units, after.scales)
     if u is None or np.abs((u - spot.u) / spot.units).max() > 2.0 * spot.distance(after):
         return None
     return attrs.evolve(spot, u=u)
@@ -316,9 +369,32 @@ def _branch_of(equations: Equations, items: list[Item], status: Status) -> Equil
         stable=np.array(stable),
         admissible=np.array([not equations.excluded_by(each.u, each.units) for each in spots]),
         bifurcations=tuple(found),
-        status=status,
+        status=attrs.evolve(status, message=" ".join([status.message, *_notes(equations, items)])),
         equations=equations,
     )
+
+
+def _notes(equations: Equations, items: list[Item]) -> list[str]:
+    """Where eigenvalues pass the axis and no bifurcation is listed, in words."""
+    notes: list[str] = []
+    before: tuple[float, int] | None = None
+    for item in items:
+        if not isinstance(item, Spot):
+            before = None
+            continue
+        own = eigenvalues_of(equations.within(item.u))
+        if np.any(np.abs(own.real) <= AT_ONE * np.abs(own).max(initial=0.0)):
+            before = None
+            continue
+        value, count = float(item.u[-1]), int(np.sum(own.real > 0.0))
+        if before is not None and count != before[1]:
+            low, high = sorted([before[0], value])
+            notes.append(
+                f"Between {equations.names[0]} = {low:.6g} and {high:.6g} several eigenvalues pass the "
+                "imaginary axis together, so the bifurcation there is not listed."
+            )
+        before = value, count
+    return notes
 
 
 def _sides(items: list[Item], i: int, stable: dict[int, bool]) -> tuple[bool | None, bool | None]:
@@ -348,13 +424,7 @@ def _bifurcation(
     elif kind == "Hopf":
         hopf = hopf_at(equations, u, spot.units * spot.tangent)
         coefficient, period = hopf.first, 2.0 * np.pi / hopf.omega
-        others = np.sort(eigenvalues_of(equations.within(u)).real)[:-2]
-        attract = hopf.first < 0.0 and np.all(others < 0.0)
-        word = "supercritical" if hopf.first < 0.0 else "subcritical"
-        message = (
-            f"{word}: {'stable' if attract else 'unstable'} cycles of period {period:.6g} begin, on the side "
-            f"of {_side(hopf.side)} {name}"
-        )
+        message = _hopf_told(equations, u, hopf, name)
     elif barrier is not None:
         others_there = neighbours(equations, u, spot.units)
         modes, guard = tuple(each.equations.mode for each in others_there if each.side), barrier.names[0]
@@ -375,6 +445,22 @@ def _bifurcation(
         barrier=guard,
         place=spot,
     )
+
+
+def _hopf_told(equations: Equations, u: np.ndarray, hopf: Hopf, name: str) -> str:
+    """What begins at a Hopf point, in words."""
+    period = f"period {2.0 * np.pi / hopf.omega:.6g}"
+    if hopf.first == 0.0:
+        return (
+            f"degenerate: the first Lyapunov coefficient is zero, as it is in a linear mode; cycles of "
+            f"{period} may be there at this {name} alone"
+        )
+    own = eigenvalues_of(equations.within(u))
+    pair = [int(np.argmin(np.abs(own - sign * 1j * hopf.omega))) for sign in (1.0, -1.0)]
+    attract = hopf.first < 0.0 and np.all(np.delete(own.real, pair) < 0.0)
+    word = "supercritical" if hopf.first < 0.0 else "subcritical"
+    kind = "stable" if attract else "unstable"
+    return f"{word}: {kind} cycles of {period} begin, on the side of {_side(hopf.side)} {name}"
 
 
 def _side(value: float) -> str:

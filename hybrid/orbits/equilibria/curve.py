@@ -17,6 +17,8 @@ LEAST_COSINE = 0.95
 # Lengths of steps, in units of the unknowns and of the range of the parameter.
 FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 0.01, 0.05, 1e-9
 FEW_CORRECTIONS, LONGER = 4, 1.5
+# A step that ends where the equations are this much nearer to singular than before it is taken longer.
+CROSSED, OVER = 0.1, 1.5
 # A state that is larger than the first one by this factor grows without bound.
 UNBOUNDED = 2.0**26
 
@@ -45,24 +47,28 @@ class Spot:
         The unknowns ``(N + 1,)`` and their units.
     tangent
         The direction of the curve ``(N + 1,)``, of length 1, in these units.
+    scales
+        Units of the equations ``(N,)``: the largest that their rows have been along the curve. At a branch
+        point a row may be zero.
     """
 
     system: System
     u: np.ndarray
     units: np.ndarray
     tangent: np.ndarray
+    scales: np.ndarray
 
     @property
     def matrix(self) -> np.ndarray:
-        """The derivatives in the unknowns in their units, each row of length 1, and the tangent below."""
-        return np.vstack([_rows(self.system, self.u, self.units)[0], self.tangent])
+        """The derivatives in the unknowns, all in their units, and the tangent below."""
+        return np.vstack([self.system.jacobian(self.u) * self.units / self.scales[:, None], self.tangent])
 
     def step(self, length: float) -> tuple[Spot, int] | None:
         """The point at a distance along the tangent, and how many corrections it took; or None."""
         made = corrected(self.system, self.u + length * self.units * self.tangent, self.units, self.tangent)
         if made is None:
             return None
-        found = spot_at(self.system, made[0], self.units, self.tangent)
+        found = spot_at(self.system, made[0], self.units, self.tangent, self.scales)
         if found is None or found.tangent @ self.tangent < LEAST_COSINE:
             return None
         return found, made[1]
@@ -96,9 +102,22 @@ def corrected(
     return (u, count) if before <= LOOSE else None
 
 
-def spot_at(system: System, u: np.ndarray, units: np.ndarray, onward: np.ndarray) -> Spot | None:
-    """The point of a curve, with the tangent that is nearest to a direction; None if it has no derivative."""
-    rows, _ = _rows(system, u, units)
+def spot_at(
+    system: System,
+    u: np.ndarray,
+    units: np.ndarray,
+    onward: np.ndarray,
+    scales: np.ndarray | None = None,
+) -> Spot | None:
+    """The point of a curve, with the tangent that is nearest to a direction; None if it has no derivative.
+
+    The ``scales`` are those of a point before, if there is one.
+    """
+    rows = system.jacobian(u) * units
+    lengths = np.linalg.norm(rows, axis=1)
+    lengths = lengths if scales is None else np.maximum(lengths, scales)
+    lengths[lengths == 0.0] = 1.0
+    rows = rows / lengths[:, None]
     if not np.isfinite(rows).all():
         return None
     try:
@@ -111,7 +130,7 @@ def spot_at(system: System, u: np.ndarray, units: np.ndarray, onward: np.ndarray
         null = vectors[min(int(np.sum(values > LOOSE * values[0])), len(vectors) - 1) :]
         along = null.T @ (null @ onward)
     length = float(np.linalg.norm(along))
-    return None if length == 0.0 else Spot(system, u, units, along / length)
+    return None if length == 0.0 else Spot(system, u, units, along / length, lengths)
 
 
 def _rows(system: System, u: np.ndarray, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -148,7 +167,7 @@ def at_value(spot: Spot, place: int, value: float) -> Spot | None:
     guess = spot.u.copy()
     guess[place] = value
     made = corrected(spot.system, guess, spot.units, np.eye(len(guess))[place])
-    return None if made is None else spot_at(spot.system, made[0], spot.units, spot.tangent)
+    return None if made is None else spot_at(spot.system, made[0], spot.units, spot.tangent, spot.scales)
 
 
 def walk(
@@ -167,6 +186,9 @@ def walk(
                 yield "lost"
                 return
             made = spot.step(length)
+        if _is_crossed(spot, made[0]):
+            # So near to another branch that it may be on that one: the step goes over the place.
+            made = spot.step(OVER * length) or made
         after, corrections = made
         values = after.u[-len(lows) :]
         if np.any(values < lows) or np.any(values > highs):
@@ -187,6 +209,12 @@ def walk(
             length = min(LONGEST_STEP, LONGER * length)
         spot = renewed(after)
     yield "most"
+
+
+def _is_crossed(spot: Spot, after: Spot) -> bool:
+    """Whether a step ends near a place where another branch crosses."""
+    one, other = (abs(float(np.linalg.det(each.matrix))) for each in (spot, after))
+    return other < CROSSED * one
 
 
 def _at_the_edge(spot: Spot, after: Spot, lows: np.ndarray, highs: np.ndarray) -> Spot | None:

@@ -43,6 +43,11 @@ ENDS = {
     "most": "the limit of steps",
     "lost": "a point beyond which Newton's method finds none",
 }
+# Of two eigenvalues that are zero where a curve is found the second is below this, as a share of those
+# of the matrix of magnitudes.
+DOUBLE = 1e-3
+# Points on both sides of one at which the equations are singular, in units of half the bracket.
+SIDES = (-1.0, -0.6, -0.25, 0.25, 0.6, 1.0)
 MESSAGES = {
     "cusp": "the coefficient of the fold is zero: two curves of folds end in one point",
     "Bogdanov-Takens": "two eigenvalues are zero: a curve of Hopf points ends on one of folds",
@@ -240,7 +245,7 @@ def _renewed(spot: Spot) -> Spot:
     units = spot.units.copy()
     units[-len(u) : -2] = np.maximum(units[-len(u) : -2], np.abs(u[:-2]))
     onward = spot.tangent * spot.units / units
-    return spot_at(system.renewed(part, spot.u), spot.u, units, onward) or spot
+    return spot_at(system.renewed(part, spot.u), spot.u, units, onward, spot.scales) or spot
 
 
 def _walked(
@@ -260,7 +265,11 @@ def _walked(
             for kind, function in TESTS[type(defining_of(item))].items():
                 one, other = function(before), function(item)
                 if one * other < 0.0:
-                    found = zero_between(before, item, function)
+                    found = (
+                        _without_frequency(before, item)
+                        if kind == "frequency"
+                        else zero_between(before, item, function)
+                    )
                     named = None if found is None else _named(kind, found)
                     if found is not None and named is not None:
                         items.append((named, found))
@@ -291,6 +300,29 @@ def _forms(spot: Spot) -> tuple[float, float, float]:
 
 def _frequency(spot: Spot) -> float:
     return float(spot.u[-len(state_of(spot)) - 1])
+
+
+def _without_frequency(spot: Spot, after: Spot) -> Spot | None:
+    """The point between two at which the frequency is zero, where the equations are singular.
+
+    The unknowns are polynomials of the frequency through points on both sides (Neville's scheme).
+    """
+    low, high = 0.0, spot.distance(after)
+    best: Spot | None = None
+    for _ in range(3):
+        lengths = 0.5 * (low + high) + 0.5 * (high - low) * np.array(SIDES)
+        found = [made[0] for made in map(spot.step, lengths) if made is not None]
+        heights = np.array([_frequency(each) for each in found])
+        if len(found) < 4 or len(set(heights.tolist())) < len(found):
+            break
+        table = np.array([np.append(each.u, spot.distance(each)) for each in found])
+        for step in range(1, len(found)):
+            left, right = heights[:-step, None], heights[step:, None]
+            table = (right * table[:-1] - left * table[1:]) / (right - left)
+        best = attrs.evolve(spot, u=table[0, :-1])
+        middle, width = float(table[0, -1]), 0.1 * (high - low)
+        low, high = middle - width, middle + width
+    return best
 
 
 def _lyapunov(spot: Spot) -> float:
@@ -326,8 +358,10 @@ def _named(kind: str, spot: Spot) -> str | None:
     if kind == "frequency":
         return "Bogdanov-Takens"
     if kind == "cusp":
-        bent, product, size = _forms(spot)
-        return "cusp" if abs(bent) <= size * abs(product) else "Bogdanov-Takens"
+        matrix = part.equations.within(u)
+        sizes = np.sort(np.abs(eigenvalues_of(matrix)))
+        largest = float(np.abs(eigenvalues_of(np.abs(matrix))).max())
+        return "Bogdanov-Takens" if len(sizes) > 1 and sizes[1] <= DOUBLE * largest else "cusp"
     if kind == "boundary-Hopf":
         own = eigenvalues_of(part.equations.within(u))
         pair = own[np.argmin(np.abs(own.real))]

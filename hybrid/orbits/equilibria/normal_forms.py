@@ -116,15 +116,17 @@ def fold_forms(
     return float(p @ bends @ whole), float(p @ within), float(np.abs(p) @ np.abs(bends) @ np.abs(whole))
 
 
-def branch_point_near(part: Reduced, u: np.ndarray, units: np.ndarray) -> np.ndarray | None:
+def branch_point_near(
+    part: Reduced, u: np.ndarray, units: np.ndarray, scales: np.ndarray
+) -> np.ndarray | None:
     """The point near ``u (n + 1,)`` at which two branches cross, by Newton's method; None if there is none.
+
+    The ``units`` are those of the unknowns, the ``scales`` those of the equations ``(n,)``.
 
     The equations are G(u) + m w = 0, w G'(u) = 0, w w = 1 in u, m and w, which are regular there (G. Moore,
     "The numerical treatment of non-trivial bifurcation points", Numer. Funct. Anal. Optim. 2 (1980) 441).
     """
     n = len(u) - 1
-    scales = np.linalg.norm(part.jacobian(u) * units, axis=1)
-    scales[scales == 0.0] = 1.0
     w, m = np.linalg.svd(part.jacobian(u) * units / scales[:, None])[0][:, -1], 0.0
     for _ in range(MOST_STEPS):
         rows = part.jacobian(u) * units / scales[:, None]
