@@ -45,6 +45,8 @@ FARTHER = (1e-5, 1e-4, 1e-3, 1e-2)
 
 # An orbit that holds what another one holds is so many of these distances away at most.
 NEIGHBOURHOOD = 5.0
+# The parameter stands still if it changes by this share of its range.
+STILL = 1e-8
 
 TANGENT = ("top", "speed")
 # Events that meet; in the others a field is along a surface.
@@ -319,7 +321,14 @@ def _away(place: Place, at: Place, length: float) -> Place | None:
         made = place.step(np.array([sign * length]))
         if made is not None and is_real(made[0].orbit) and not made[0].orbit.is_point:
             found.append(attrs.evolve(made[0], tangents=sign * made[0].tangents))
-    return max(found, key=lambda each: abs(each.value - at.value), default=None)
+    moved = {id(each): abs(each.value - at.value) for each in found}
+    if max(moved.values(), default=0.0) <= STILL * float(at.sizes[0]):
+        # In a family at one value of the parameter the states tell.
+        sizes = at.orbit.scale
+        moved = {
+            id(each): float(np.abs((each.orbit.extremes - at.orbit.extremes) / sizes).max()) for each in found
+        }
+    return max(found, key=lambda each: moved[id(each)], default=None)
 
 
 Asked = tuple[Family, Pass, tuple[list[tuple[str, ...]], list[tuple[str, ...]]], int | None]

@@ -112,6 +112,11 @@ class Pass:
         """Whether nothing moves along it: an equilibrium of an autonomous system is no orbit."""
         return not self.family.forced and bool(np.all(np.ptp(self._states, axis=0) <= NO_SIZE * self.scale))
 
+    @property
+    def extremes(self) -> np.ndarray:
+        """The smallest and the largest values of the components ``(2, n)``."""
+        return np.array([self._states.min(axis=0), self._states.max(axis=0)])
+
     @cached_property
     def _states(self) -> np.ndarray:
         """States ``(N, n)`` all along the orbit."""

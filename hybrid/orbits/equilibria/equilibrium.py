@@ -29,6 +29,8 @@ SHORTEST = 2.0**-20
 # They end at this size, in units of the state, and have failed if they stay above the second one.
 SMALL, LOOSE = 4 * EPSILON, 1e-9
 MOST_STEPS = 60
+# Singular values below this share of the largest count as zero.
+SINGULAR = 1e-13
 # A component below this, in units of the state, is zero.
 ZERO = 16 * EPSILON
 # Rounding of an eigenvalue, in units of the largest entry of the matrix.
@@ -274,7 +276,11 @@ def _newton(equations: Equations, u: np.ndarray, at: np.ndarray | None = None) -
         return np.full(len(u), np.inf)
     lengths = np.linalg.norm(rows, axis=1)
     lengths[lengths == 0.0] = 1.0
-    return np.linalg.lstsq(rows / lengths[:, None], -values / lengths, rcond=1e-13)[0]
+    scaled, wanted = rows / lengths[:, None], -values / lengths
+    if np.linalg.matrix_rank(scaled, tol=SINGULAR) == len(u):
+        # Elimination leaves components that have nothing to do with each other alone: a zero stays one.
+        return np.linalg.solve(scaled, wanted)
+    return np.linalg.lstsq(scaled, wanted, rcond=SINGULAR)[0]
 
 
 def _size(step: np.ndarray, units: np.ndarray) -> float:
