@@ -157,6 +157,18 @@ def time_span(name: str, value: object) -> tuple[float, float]:
     return t0, t1
 
 
+def span_around(name: str, value: object, parameter: str, at: float) -> tuple[float, float]:
+    """The ends of a range that contains the value ``at`` of a parameter, but for rounding."""
+    ends = numbers(name, value, "be (low, high)")
+    # The range is a unit: its square has to be a number.
+    if ends.shape != (2,) or not np.all(np.abs(ends) < 1e150):
+        raise refusal(name, "be (low, high)", value)
+    low, high = ends.tolist()
+    if within(np.array([at]), low, high) is None or not low < high:
+        raise ArgumentError(f"{name} must be (low, high) around {parameter} = {at}; got {shown(value)}.")
+    return min(low, at), max(high, at)
+
+
 def within(times: np.ndarray, t0: float, t1: float) -> np.ndarray | None:
     """Numbers that lie in ``[t0, t1]`` but for the rounding of sums and products, put into it; else None.
 

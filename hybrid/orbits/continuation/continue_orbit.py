@@ -166,16 +166,7 @@ def continue_orbit(
     if not orbit.closes:
         raise ArgumentError(f"orbit has not converged: {orbit.status.message}")
     arguments.known("parameter: Parameter", parameter, orbit.system.parameters, "Parameters")
-    ends = arguments.numbers("span", span, "be (low, high)")
-    # The range is a unit: its square has to be a number.
-    if ends.shape != (2,) or not np.all(np.abs(ends) < 1e150):
-        raise arguments.refusal("span", "be (low, high)", span)
-    low, high = ends.tolist()
-    value = orbit.parameters[parameter]
-    if arguments.within(np.array([value]), low, high) is None or not low < high:
-        got = arguments.shown(span)
-        raise ArgumentError(f"span must be (low, high) around {parameter} = {value}; got {got}.")
-    low, high = min(low, value), max(high, value)
+    low, high = arguments.span_around("span", span, parameter, orbit.parameters[parameter])
     most = arguments.count("max_steps", max_steps, 1)
     progress = None if progress is None else arguments.flag("progress", progress)
     method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)

@@ -16,6 +16,7 @@ from hybrid.orbits.continuation.parts import divided, growth, holding
 from hybrid.orbits.continuation.passing import CLOSED, Pass
 from hybrid.orbits.continuation.route import LARGEST_GROWTH, Loop, route_of
 from hybrid.orbits.held import conserved_at
+from hybrid.orbits.zeros import SHARES, at_zero, zero_on_the_way
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver
@@ -29,8 +30,6 @@ SHORTEST_STEP = 1e-7
 SAME_TIME = 1e-6
 # Stretches are divided anew if errors grow by this much more along one of them than they may.
 TOO_LARGE = 10.0
-# The unknowns are polynomials of a function through places at these shares of the bracket around its zero.
-SHARES = (-1.0, -0.6, -0.25, 0.25, 0.6, 1.0)
 # Two of these polynomials agree to this, in units of the unknowns.
 AGREE = 1e-12
 LOOSE = 1e-7
@@ -133,29 +132,6 @@ def zero_between(place: Place, after: Place, function: Callable[[Place], float])
     return zero_on_the_way({0.0: place, distance(place, after): after}, step, function)
 
 
-def zero_on_the_way(
-    known: dict[float, Any], step: Callable[[float], Any], function: Callable[[Any], float]
-) -> Any:
-    """What a ``step`` of a length gives where a function of that is zero, between two ``known`` ends.
-
-    None if it does not change its sign, or a step fails.
-    """
-    from scipy.optimize import brentq
-
-    def value(s: float) -> float:
-        if s not in known:
-            known[s] = step(s)
-        if known[s] is None:
-            raise ArithmeticError
-        return function(known[s])
-
-    try:
-        root = brentq(value, *known, xtol=1e-14, rtol=4e-16 * 4, maxiter=60, disp=False)
-    except (ArithmeticError, ValueError):
-        return None
-    return known[min(known, key=lambda s: abs(s - root))]
-
-
 def interpolated_zero(
     place: Place, function: Callable[[Place], float], bracket: tuple[float, float]
 ) -> Place | None:
@@ -179,7 +155,7 @@ def interpolated_zero(
         if len(places) < 3 or len(set(heights)) < len(heights):
             break
         unknowns = np.array([each.orbit.loop.flat for each in places])
-        ends = [_at_zero(np.array(heights)[part], unknowns[part]) for part in (slice(None), slice(1, None))]
+        ends = [at_zero(np.array(heights)[part], unknowns[part]) for part in (slice(None), slice(1, None))]
         units = place.units
         new = float(np.max(np.abs(ends[0] - ends[1]) / units))
         if not np.isfinite(new) or not new < error:
@@ -197,15 +173,6 @@ def interpolated_zero(
     found = best if orbit is None else attrs.evolve(best, orbit=orbit)
     beside = BESIDE * (high - low)
     return found if low - beside <= distance(place, found) <= high + beside else None
-
-
-def _at_zero(heights: np.ndarray, unknowns: np.ndarray) -> np.ndarray:
-    """The polynomial of ``heights (k,)`` through ``unknowns (k, n)``, at zero (Neville's scheme)."""
-    table = unknowns.copy()
-    for step in range(1, len(heights)):
-        left, right = heights[:-step, None], heights[step:, None]
-        table = (right * table[:-1] - left * table[1:]) / (right - left)
-    return np.asarray(table[0])
 
 
 def place_of(orbit: Pass, onward: np.ndarray, sizes: np.ndarray) -> Place | None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from hybrid.errors import ArgumentError, ModelError
 from hybrid.orbits.equilibria.equations import ON_IT, Barrier, Equations, Reduced, reduced
+from hybrid.orbits.equilibria.smooth import row_lengths
 
 # The rates of another mode are zero at a boundary if they are to this share of their terms.
 ZERO = 1e-8
@@ -46,8 +47,7 @@ def neighbour_of(equations: Equations, u: np.ndarray, sizes: np.ndarray) -> Neig
         return None
     # The least motion, where equilibria are not alone, as those of a mass at rest.
     scaled = rows * sizes
-    lengths = np.linalg.norm(scaled, axis=1)
-    scaled = scaled / np.where(lengths == 0.0, 1.0, lengths)[:, None]
+    scaled = scaled / row_lengths(scaled)[:, None]
     moved = np.linalg.lstsq(scaled[:, :-1], -scaled[:, -1], rcond=SINGULAR)[0]
     onward = np.append(moved, 1.0) * sizes / sizes[-1]
     if np.any(np.abs(rows @ onward) > ZERO * (np.abs(rows) @ sizes) / sizes[-1]):

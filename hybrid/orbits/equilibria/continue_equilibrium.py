@@ -19,6 +19,7 @@ from hybrid.orbits.equilibria.curve import Spot, spot_at, walk, zero_between
 from hybrid.orbits.equilibria.equations import Barrier, Equations, Reduced, reduced, sizes_of
 from hybrid.orbits.equilibria.equilibrium import Equilibrium, described, eigenvalues_of, is_stable
 from hybrid.orbits.equilibria.normal_forms import Hopf, branch_point_near, critical_pair, fold_at, hopf_at
+from hybrid.orbits.equilibria.smooth import row_lengths
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.status import SUCCESS, Status, StatusCode
 
@@ -111,22 +112,13 @@ def continue_equilibrium(
     if not point.status.ok:
         raise ArgumentError(f"point has not converged: {point.status.message}")
     arguments.known("parameter: Parameter", parameter, point.system.parameters, "Parameters")
-    ends = arguments.numbers("span", span, "be (low, high)")
-    # The range is a unit: its square has to be a number.
-    if ends.shape != (2,) or not np.all(np.abs(ends) < 1e150):
-        raise arguments.refusal("span", "be (low, high)", span)
-    low, high = ends.tolist()
-    value = point.parameters[parameter]
-    if arguments.within(np.array([value]), low, high) is None or not low < high:
-        raise ArgumentError(
-            f"span must be (low, high) around {parameter} = {value}; got {arguments.shown(span)}."
-        )
+    low, high = arguments.span_around("span", span, parameter, point.parameters[parameter])
     most = arguments.count("max_steps", max_steps, 1)
     progress = None if progress is None else arguments.flag("progress", progress)
     vector = point.system.parameter_values(point.parameters)
     equations = Equations(point.system, point.mode, (parameter,), point.x, vector)
     with CTRL_C, progress_bar(None, "Branch", progress, "point") as bar:
-        items, why = _both_ways(equations, min(low, value), max(high, value), most, bar)
+        items, why = _both_ways(equations, low, high, most, bar)
         interrupted = CTRL_C.is_set()
     status = interrupted_status("the equilibria so far") if interrupted else _status(why)
     return _branch_of(equations, items, status)
@@ -173,8 +165,7 @@ def _first(equations: Equations, reach: float) -> Spot:
     least = np.maximum(np.abs(u[:n]), np.minimum(moved, _largest(u[:n], moved)))
     units = np.append(sizes_of(equations.matrix(u), least), reach)
     scaled = rows * units
-    lengths = np.linalg.norm(scaled, axis=1)
-    values = np.linalg.svd(scaled / np.where(lengths == 0.0, 1.0, lengths)[:, None], compute_uv=False)
+    values = np.linalg.svd(scaled / row_lengths(scaled)[:, None], compute_uv=False)
     spot = spot_at(part, u, units, np.eye(n + 1)[n])
     if spot is None or spot.tangent[n] == 0.0:
         _, _, right = np.linalg.svd(scaled)
@@ -214,7 +205,7 @@ def _renewed(equations: Equations, spot: Spot) -> Spot:
     """A point with the surfaces of the mode as they are there, and units that have grown with the state."""
     assert isinstance(spot.system, Reduced)
     units = np.maximum(spot.units, np.append(np.abs(spot.u[:-1]), 0.0))
-    part = Reduced(equations, equations.basis(spot.u, spot.system.basis))
+    part = reduced(equations, spot.u, spot.system.basis)
     return spot_at(part, spot.u, units, spot.tangent * spot.units / units, spot.scales) or spot
 
 
@@ -350,6 +341,7 @@ def _branch_of(equations: Equations, items: list[Item], status: Status) -> Equil
     """The branch through points and bifurcations in order."""
     spots = [each for each in items if isinstance(each, Spot)]
     own = [eigenvalues_of(equations.within(each.u)) for each in spots]
+    values = dict(zip(map(id, spots), own, strict=True))
     stable = [is_stable(each) for each in own]
     beside = dict(zip(map(id, spots), stable, strict=True))
     found = [
@@ -359,6 +351,7 @@ def _branch_of(equations: Equations, items: list[Item], status: Status) -> Equil
         for i, item in enumerate(items)
         if not isinstance(item, Spot)
     ]
+    notes = _notes(equations.names[0], items, values)
     return EquilibriumBranch(
         system=equations.system,
         name=equations.names[0],
@@ -369,12 +362,12 @@ def _branch_of(equations: Equations, items: list[Item], status: Status) -> Equil
         stable=np.array(stable),
         admissible=np.array([not equations.excluded_by(each.u, each.units) for each in spots]),
         bifurcations=tuple(found),
-        status=attrs.evolve(status, message=" ".join([status.message, *_notes(equations, items)])),
+        status=attrs.evolve(status, message=" ".join([status.message, *notes])),
         equations=equations,
     )
 
 
-def _notes(equations: Equations, items: list[Item]) -> list[str]:
+def _notes(name: str, items: list[Item], eigenvalues: dict[int, np.ndarray]) -> list[str]:
     """Where eigenvalues pass the axis and no bifurcation is listed, in words."""
     notes: list[str] = []
     before: tuple[float, int] | None = None
@@ -382,7 +375,7 @@ def _notes(equations: Equations, items: list[Item]) -> list[str]:
         if not isinstance(item, Spot):
             before = None
             continue
-        own = eigenvalues_of(equations.within(item.u))
+        own = eigenvalues[id(item)]
         if np.any(np.abs(own.real) <= AT_ONE * np.abs(own).max(initial=0.0)):
             before = None
             continue
@@ -390,7 +383,7 @@ def _notes(equations: Equations, items: list[Item]) -> list[str]:
         if before is not None and count != before[1]:
             low, high = sorted([before[0], value])
             notes.append(
-                f"Between {equations.names[0]} = {low:.6g} and {high:.6g} several eigenvalues pass the "
+                f"Between {name} = {low:.6g} and {high:.6g} several eigenvalues pass the "
                 "imaginary axis together, so the bifurcation there is not listed."
             )
         before = value, count

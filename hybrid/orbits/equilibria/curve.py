@@ -9,6 +9,9 @@ from typing import Protocol
 import attrs
 import numpy as np
 
+from hybrid.orbits.equilibria.smooth import row_lengths
+from hybrid.orbits.zeros import zero_on_the_way
+
 # Corrections stop at this size, in units of the unknowns, and fail if they have not come to the second one.
 SMALL, LOOSE = 1e-14, 1e-10
 MOST_CORRECTIONS = 12
@@ -114,9 +117,7 @@ def spot_at(
     The ``scales`` are those of a point before, if there is one.
     """
     rows = system.jacobian(u) * units
-    lengths = np.linalg.norm(rows, axis=1)
-    lengths = lengths if scales is None else np.maximum(lengths, scales)
-    lengths[lengths == 0.0] = 1.0
+    lengths = row_lengths(rows) if scales is None else np.maximum(row_lengths(rows), scales)
     rows = rows / lengths[:, None]
     if not np.isfinite(rows).all():
         return None
@@ -136,30 +137,19 @@ def spot_at(
 def _rows(system: System, u: np.ndarray, units: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The derivatives in the unknowns in their units, each row of length 1, and the values with them."""
     rows = system.jacobian(u) * units
-    lengths = np.linalg.norm(rows, axis=1)
-    lengths[lengths == 0.0] = 1.0
+    lengths = row_lengths(rows)
     return rows / lengths[:, None], system.residual(u) / lengths
 
 
 def zero_between(spot: Spot, after: Spot, function: Callable[[Spot], float]) -> Spot | None:
     """The point between two where a function changes its sign; None if it is not found."""
-    from scipy.optimize import brentq
 
-    known = {0.0: spot, spot.distance(after): after}
+    def step(length: float) -> Spot | None:
+        made = spot.step(length)
+        return None if made is None else made[0]
 
-    def value(length: float) -> float:
-        if length not in known:
-            made = spot.step(length)
-            if made is None:
-                raise ArithmeticError
-            known[length] = made[0]
-        return function(known[length])
-
-    try:
-        root = brentq(value, *known, xtol=1e-15, rtol=4e-16 * 4, maxiter=80, disp=False)
-    except (ArithmeticError, ValueError):
-        return None
-    return known[min(known, key=lambda each: abs(each - root))]
+    found: Spot | None = zero_on_the_way({0.0: spot, spot.distance(after): after}, step, function)
+    return found
 
 
 def at_value(spot: Spot, place: int, value: float) -> Spot | None:

@@ -27,6 +27,7 @@ from hybrid.orbits.equilibria.defining import (
 from hybrid.orbits.equilibria.equations import Equations, Reduced, reduced
 from hybrid.orbits.equilibria.equilibrium import Equilibrium, described, eigenvalues_of
 from hybrid.orbits.equilibria.normal_forms import eigenvectors, fold_forms, lyapunov_at
+from hybrid.orbits.zeros import SHARES, at_zero
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.status import SUCCESS, Status, StatusCode
@@ -46,8 +47,6 @@ ENDS = {
 # Of two eigenvalues that are zero where a curve is found the second is below this, as a share of those
 # of the matrix of magnitudes.
 DOUBLE = 1e-3
-# Points on both sides of one at which the equations are singular, in units of half the bracket.
-SIDES = (-1.0, -0.6, -0.25, 0.25, 0.6, 1.0)
 MESSAGES = {
     "cusp": "the coefficient of the fold is zero: two curves of folds end in one point",
     "Bogdanov-Takens": "two eigenvalues are zero: a curve of Hopf points ends on one of folds",
@@ -241,7 +240,7 @@ def _begun(bifurcation: EquilibriumBifurcation, equations: Equations, reach: np.
 def _renewed(spot: Spot) -> Spot:
     """A point with the equations as they are there, and units that have grown with the state."""
     system, u = defining_of(spot), state_of(spot)
-    part = Reduced(system.part.equations, system.part.equations.basis(u, system.part.basis))
+    part = reduced(system.part.equations, u, system.part.basis)
     units = spot.units.copy()
     units[-len(u) : -2] = np.maximum(units[-len(u) : -2], np.abs(u[:-2]))
     onward = spot.tangent * spot.units / units
@@ -289,11 +288,11 @@ def _parts(spot: Spot) -> tuple[Reduced, np.ndarray]:
 
 def _fold_forms(spot: Spot) -> float:
     """Zero at a cusp, and where a second eigenvalue is zero."""
-    bent, product, _ = _forms(spot)
+    bent, product = _forms(spot)
     return bent * product
 
 
-def _forms(spot: Spot) -> tuple[float, float, float]:
+def _forms(spot: Spot) -> tuple[float, float]:
     part, u = _parts(spot)
     return fold_forms(part, u, 2, spot.u[: part.equations.n])
 
@@ -305,22 +304,19 @@ def _frequency(spot: Spot) -> float:
 def _without_frequency(spot: Spot, after: Spot) -> Spot | None:
     """The point between two at which the frequency is zero, where the equations are singular.
 
-    The unknowns are polynomials of the frequency through points on both sides (Neville's scheme).
+    The unknowns are polynomials of the frequency through points on both sides.
     """
     low, high = 0.0, spot.distance(after)
     best: Spot | None = None
     for _ in range(3):
-        lengths = 0.5 * (low + high) + 0.5 * (high - low) * np.array(SIDES)
+        lengths = 0.5 * (low + high) + 0.5 * (high - low) * np.array(SHARES)
         found = [made[0] for made in map(spot.step, lengths) if made is not None]
         heights = np.array([_frequency(each) for each in found])
         if len(found) < 4 or len(set(heights.tolist())) < len(found):
             break
-        table = np.array([np.append(each.u, spot.distance(each)) for each in found])
-        for step in range(1, len(found)):
-            left, right = heights[:-step, None], heights[step:, None]
-            table = (right * table[:-1] - left * table[1:]) / (right - left)
-        best = attrs.evolve(spot, u=table[0, :-1])
-        middle, width = float(table[0, -1]), 0.1 * (high - low)
+        unknowns = at_zero(heights, np.array([np.append(each.u, spot.distance(each)) for each in found]))
+        best = attrs.evolve(spot, u=unknowns[:-1])
+        middle, width = float(unknowns[-1]), 0.1 * (high - low)
         low, high = middle - width, middle + width
     return best
 
@@ -382,7 +378,7 @@ def _result(
         coefficients = np.array([_lyapunov(each) for each in spots])
     elif bifurcation.kind == "fold":
         forms = [_forms(each) for each in spots]
-        coefficients = np.array([0.5 * bent / product for bent, product, _ in forms])
+        coefficients = np.array([0.5 * bent / product for bent, product in forms])
     first, second = equations.names
     return EquilibriumCurve(
         system=equations.system,

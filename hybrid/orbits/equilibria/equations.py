@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import cached_property
 
 import attrs
@@ -300,6 +300,6 @@ class Reduced:
         return np.vstack([self.basis.T @ rates, surfaces])
 
 
-def reduced(equations: Equations, u: np.ndarray, like: Sequence[float] | None = None) -> Reduced:
-    """The equations with the directions within the surfaces at a place."""
-    return Reduced(equations, equations.basis(u, None if like is None else np.asarray(like)))
+def reduced(equations: Equations, u: np.ndarray, like: np.ndarray | None = None) -> Reduced:
+    """The equations with the directions within the surfaces at a place, turned to those of another one."""
+    return Reduced(equations, equations.basis(u, like))

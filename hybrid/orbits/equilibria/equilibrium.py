@@ -14,6 +14,7 @@ from hybrid import arguments
 from hybrid.display.tables import html_table, with_unit
 from hybrid.errors import ArgumentError
 from hybrid.orbits.equilibria.equations import Equations, reduced, sizes_of
+from hybrid.orbits.equilibria.smooth import row_lengths
 from hybrid.simulation.labelled import Names, attributes, with_outputs
 from hybrid.simulation.quantities import Asked, table_of
 from hybrid.status import SUCCESS, Status, StatusCode
@@ -274,8 +275,7 @@ def _newton(equations: Equations, u: np.ndarray, at: np.ndarray | None = None) -
     rows, values = part.jacobian(u if at is None else at), part.residual(u)
     if not (np.isfinite(rows).all() and np.isfinite(values).all()):
         return np.full(len(u), np.inf)
-    lengths = np.linalg.norm(rows, axis=1)
-    lengths[lengths == 0.0] = 1.0
+    lengths = row_lengths(rows)
     scaled, wanted = rows / lengths[:, None], -values / lengths
     if np.linalg.matrix_rank(scaled, tol=SINGULAR) == len(u):
         # Elimination leaves components that have nothing to do with each other alone: a zero stays one.

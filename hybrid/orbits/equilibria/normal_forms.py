@@ -93,7 +93,7 @@ def fold_at(part: Reduced, u: np.ndarray) -> tuple[float, float]:
 
     The null vectors ``q`` and ``p`` have length 1 and product 1, as in Kuznetsov, section 3.3.
     """
-    bent, product, _ = fold_forms(part, u, 1)
+    bent, product = fold_forms(part, u, 1)
     rows = part.jacobian(u)
     p = np.linalg.svd(rows[:, :-1])[0][:, -1]
     return 0.5 * bent / product, -bent / float(p @ rows[:, -1])
@@ -101,8 +101,8 @@ def fold_at(part: Reduced, u: np.ndarray) -> tuple[float, float]:
 
 def fold_forms(
     part: Reduced, u: np.ndarray, count: int, like: np.ndarray | None = None
-) -> tuple[float, float, float]:
-    """``p.B(q, q)`` and ``p.q`` for null vectors of length 1, and the size of the terms of the first.
+) -> tuple[float, float]:
+    """``p.B(q, q)`` and ``p.q`` for null vectors of length 1.
 
     There are ``count`` parameters among the unknowns. The vector ``q`` points as ``like (n,)`` does.
     """
@@ -113,7 +113,7 @@ def fold_forms(
     whole = np.append(q, np.zeros(count))
     bends = part.second_along(u, whole)
     within = np.concatenate([part.basis.T @ q, np.zeros(len(p) - part.basis.shape[1])])
-    return float(p @ bends @ whole), float(p @ within), float(np.abs(p) @ np.abs(bends) @ np.abs(whole))
+    return float(p @ bends @ whole), float(p @ within)
 
 
 def branch_point_near(

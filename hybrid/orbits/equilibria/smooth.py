@@ -15,6 +15,13 @@ from hybrid.expression.nodes import Expression, Symbol
 Known = Mapping[Symbol, Any]
 
 
+def row_lengths(rows: np.ndarray) -> np.ndarray:
+    """The length of each row of a matrix ``(k,)``, 1 for a row that is zero."""
+    lengths = np.linalg.norm(rows, axis=1)
+    lengths[lengths == 0.0] = 1.0
+    return lengths
+
+
 class Smooth:
     """A map from ``unknowns (N,)`` to the values of expressions ``(k,)``, with exact derivatives.
 
