@@ -12,7 +12,7 @@ import numpy as np
 from hybrid import arguments
 from hybrid.display.tables import counted
 from hybrid.orbits.continuation.change import Change
-from hybrid.orbits.continuation.event import KINDS
+from hybrid.orbits.continuation.event import KINDS, OfThisProcess
 from hybrid.orbits.continuation.labelled import dataset_of
 from hybrid.orbits.continuation.place import Place
 from hybrid.orbits.kinds import of_kinds
@@ -79,6 +79,8 @@ class Bifurcation:
     outputs: Mapping[str, float] = attrs.field(factory=dict)
     _place: Place | None = attrs.field(default=None, repr=False)
     _change: Change | None = attrs.field(default=None, repr=False)
+    # Of a bifurcation with a name from ``events=``.
+    _zero_of: OfThisProcess = attrs.field(default=OfThisProcess(), repr=False)
 
     def __str__(self) -> str:
         return f"{self.kind} at {self.parameter} = {self.value:.10g}: {self.message}"

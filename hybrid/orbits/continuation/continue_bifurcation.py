@@ -15,8 +15,9 @@ from hybrid.display.tables import counted
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation
 from hybrid.orbits.continuation.clearances import curve_clearance_of
-from hybrid.orbits.continuation.curve import SMOOTH, Curve, Special, Spot, along_curve
+from hybrid.orbits.continuation.curve import BESIDE, SMOOTH, Curve, Special, Spot, along_curve
 from hybrid.orbits.continuation.event import KINDS
+from hybrid.orbits.continuation.monitors import JUMPED
 from hybrid.orbits.continuation.place import Place, place_of, place_on
 from hybrid.orbits.continuation.result import Points, orbit_of, whole_orbit_of
 from hybrid.orbits.continuation.route import Loop
@@ -196,14 +197,16 @@ def continue_bifurcation(
 
     The orbits of two parameters form a surface. The curve is where the test function of the bifurcation is
     zero on it: of a fold, a flip or a torus the same as in :func:`hybrid.continue_orbit`, and where the
-    transitions change the height, speed, time or comparison of a condition that vanishes there. Of
-    equilibria a fold, a Hopf point and a boundary are followed by regular equations of their own.
+    transitions change the height, speed, time or comparison of a condition that vanishes there. Of a zero
+    of ``events=`` it is that function. Of equilibria a fold, a Hopf point and a boundary are followed by
+    regular equations of their own.
 
     Parameters
     ----------
     bifurcation
         Of a `Branch` or an `EquilibriumBranch`: any kind but a branch point, which two parameters do not
-        keep, and zeros of functions in ``events=``.
+        keep. A zero of a function in ``events=`` is followed where the function passes zero smoothly, not
+        where it jumps to the other sign.
     over
         Names of two parameters with their ranges: ``{"omega": (6.5, 8.5), "P": (300.0, 700.0)}``.
     outputs
@@ -224,7 +227,7 @@ def continue_bifurcation(
     ------
     ArgumentError
         If the bifurcation has no curve, a parameter does not exist, a range does not contain its value, or a
-        function in ``outputs`` gives no finite number for the orbit.
+        function in ``outputs`` or ``events`` gives no finite number for the orbit.
 
     References
     ----------
@@ -254,9 +257,11 @@ def continue_bifurcation(
         return curve_of(bifurcation, names, lows, highs, most, progress)
     method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
     measured = checked_outputs(outputs, bifurcation.orbit.system)
-    watch = Watch(method, Points(bifurcation.orbit.t0), measured)
+    function = bifurcation._zero_of.function
+    located = {} if function is None else {bifurcation.kind: function}
+    watch = Watch(method, Points(bifurcation.orbit.t0), measured, located)
     place = _start(bifurcation, names, highs - lows, method)
-    curve = _curve_of(bifurcation, place)
+    curve = _curve_of(bifurcation, place, watch)
     begin = curve.begin(place)
     if begin is None:
         raise ArgumentError(f"the {bifurcation.kind} is not found again over {names[0]} and {names[1]}.")
@@ -302,10 +307,10 @@ def _start(bifurcation: Bifurcation, names: tuple[str, str], sizes: np.ndarray, 
             "bifurcation is a branch point, which goes away when another parameter changes; allowed are the "
             "other kinds."
         )
-    if bifurcation.kind not in KINDS:
+    if bifurcation.kind not in KINDS and bifurcation._zero_of.function is None:
         raise ArgumentError(
-            f"bifurcation is a zero of events[{bifurcation.kind!r}], which has no curve over two parameters; "
-            f"allowed are {', '.join(kind for kind in KINDS if kind != 'branch point')}."
+            f"bifurcation is a zero of events[{bifurcation.kind!r}] of a branch that was opened again or "
+            "pickled, which keeps no functions: take it from one that continue_orbit makes."
         )
     known = bifurcation._place
     if known is None:
@@ -327,15 +332,34 @@ def _start(bifurcation: Bifurcation, names: tuple[str, str], sizes: np.ndarray, 
     return place
 
 
-def _curve_of(bifurcation: Bifurcation, place: Place) -> Curve:
+def _curve_of(bifurcation: Bifurcation, place: Place, watch: Watch) -> Curve:
     if bifurcation.kind in SMOOTH:
         return Curve(bifurcation.kind, SMOOTH[bifurcation.kind])
+    if bifurcation.kind in watch.events:
+        return _curve_of_zero(bifurcation.kind, place, watch)
     assert bifurcation._change is not None
     exact = bifurcation._change.exact
     clearance = curve_clearance_of(exact.key)
     side = float(np.sign(clearance(exact.before.orbit)))
     bounded = exact.key.kind != "speed"
     return Curve(bifurcation.kind, lambda each: clearance(each.orbit), side, bounded)
+
+
+def _curve_of_zero(name: str, place: Place, watch: Watch) -> Curve:
+    """The curve of a zero of ``events=``, where the function passes zero in a continuous way."""
+
+    def height(each: Place) -> float:
+        return watch.value(name, each.orbit)
+
+    made = [place.step(BESIDE * direction) for direction in (*np.eye(2), *-np.eye(2))]
+    beside = [abs(height(each[0])) for each in made if each is not None]
+    if abs(height(place)) > JUMPED * max(beside, default=0.0):
+        raise ArgumentError(
+            f"bifurcation is a place where events[{name!r}] jumps to the other sign, or where the transitions "
+            "change, which has no curve over two parameters; allowed are zeros that the function passes "
+            "continuously."
+        )
+    return Curve(name, height)
 
 
 def _both_ways(

@@ -14,7 +14,7 @@ from hybrid.display.progress import Progress, progress_bar
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
 from hybrid.orbits.continuation.crossing import crossing, flip_coefficient, fold_coefficient, is_supercritical
-from hybrid.orbits.continuation.event import KINDS, Event
+from hybrid.orbits.continuation.event import KINDS, Event, OfThisProcess
 from hybrid.orbits.continuation.hopf import first_lyapunov
 from hybrid.orbits.continuation.monitors import Monitors
 from hybrid.orbits.continuation.passing import Pass
@@ -387,6 +387,7 @@ def bifurcation_of(event: Event, beside: Beside, watch: Watch) -> Bifurcation:
         watch.outputs_near(place.orbit),
         place,
         event.change,
+        OfThisProcess(watch.events.get(event.kind)),
     )
 
 

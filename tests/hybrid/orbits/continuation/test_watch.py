@@ -265,8 +265,6 @@ class TestFailures:
             branch.of("nera")
         with pytest.raises(ArgumentError, match="kinds must be a kind of bifurcation, or several"):
             branch.of(())
-        with pytest.raises(ArgumentError, match=r"is a zero of events\['near'\], which has no curve"):
-            continue_bifurcation(branch.of("near")[0], {"w": (1.4, 1.7), "A": (0.2, 0.4)})
         with pytest.raises(ArgumentError, match="bifurcation is a near, where no other branch of"):
             hybrid.switch_branch(branch.of("near")[0])
 
