@@ -355,9 +355,9 @@ def _curve_of_zero(name: str, place: Place, watch: Watch) -> Curve:
     beside = [abs(height(each[0])) for each in made if each is not None]
     if abs(height(place)) > JUMPED * max(beside, default=0.0):
         raise ArgumentError(
-            f"bifurcation is a place where events[{name!r}] jumps to the other sign, or where the transitions "
-            "change, which has no curve over two parameters; allowed are zeros that the function passes "
-            "continuously."
+            f"bifurcation is a place where events[{name!r}] jumps to the other sign, or where the "
+            "transitions change, which has no curve over two parameters; allowed are zeros that the function "
+            "passes continuously."
         )
     return Curve(name, height)
 
