@@ -195,7 +195,7 @@ def opening(side: int) -> None:
     points = as_points({"a": values, "b": values})
     with scratch() as folder:
         path = folder / "run.zarr"
-        from hybrid.sweep.identity import attributes_of, facts_of
+        from hybrid.simulation.identity import attributes_of, facts_of
         from hybrid.sweep.sheet import Labels, Sheet
 
         task = Two()

@@ -14,16 +14,16 @@ from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError, HybridError, ModelError
 from hybrid.expression.table import Table
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
-from hybrid.orbits.continuation.continue_all import continue_all
 from hybrid.orbits.continuation.continue_bifurcation import (
     BifurcationCurve,
     CodimensionTwo,
     continue_bifurcation,
 )
 from hybrid.orbits.continuation.continue_orbit import continue_orbit
-from hybrid.orbits.continuation.diagram import Diagram
-from hybrid.orbits.continuation.saved import open_branch
 from hybrid.orbits.continuation.switch_branch import switch_branch
+from hybrid.orbits.diagrams.continue_all import continue_all
+from hybrid.orbits.diagrams.diagram import Diagram
+from hybrid.orbits.diagrams.saved import open_branch, open_diagram
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation, EquilibriumBranch
 from hybrid.orbits.equilibria.continue_equilibrium import continue_equilibrium
 from hybrid.orbits.equilibria.curves import EquilibriumCurve, SpecialEquilibrium
@@ -123,6 +123,7 @@ __all__ = [
     "from_equations",
     "global_error",
     "open_branch",
+    "open_diagram",
     "open_end",
     "open_store",
     "periodic_orbit",

@@ -12,7 +12,7 @@ from typing import Any
 from hybrid import arguments
 from hybrid.orbits.continuation.branch import Branch
 from hybrid.orbits.continuation.continue_bifurcation import BifurcationCurve
-from hybrid.orbits.continuation.diagram import Diagram
+from hybrid.orbits.diagrams.diagram import Diagram
 from hybrid.orbits.equilibria.branch import EquilibriumBranch
 from hybrid.orbits.equilibria.curves import EquilibriumCurve
 from hybrid.orbits.orbit import PeriodicOrbit

@@ -13,7 +13,7 @@ from hybrid.display.tables import with_unit
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Branch
 from hybrid.orbits.continuation.continue_bifurcation import BifurcationCurve
-from hybrid.orbits.continuation.diagram import Diagram
+from hybrid.orbits.diagrams.diagram import Diagram
 from hybrid.orbits.equilibria.branch import EquilibriumBranch
 from hybrid.orbits.equilibria.curves import EquilibriumCurve
 from hybrid.orbits.labelled import table_at

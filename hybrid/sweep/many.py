@@ -19,6 +19,7 @@ from hybrid.kernels.types import codes
 from hybrid.kernels.types.starts import Sampled
 from hybrid.simulation.crew import TOGETHER, Crew, berths, together
 from hybrid.simulation.ending import status_of
+from hybrid.simulation.extra import load_xarray
 from hybrid.simulation.labelled import Names, attributes, with_outputs
 from hybrid.simulation.memory import starts_of
 from hybrid.simulation.periods import check_time, split_time
@@ -29,7 +30,6 @@ from hybrid.simulation.trajectory import Trajectory
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
 from hybrid.sweep.blocks import run_in_blocks
-from hybrid.sweep.extra import load_xarray
 from hybrid.sweep.local import cores
 from hybrid.sweep.outcome import text_of
 from hybrid.sweep.sheet import UNTOUCHED, flags

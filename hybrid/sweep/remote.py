@@ -18,8 +18,8 @@ import numpy as np
 from hybrid import arguments
 from hybrid.compiler.interrupts import CTRL_C
 from hybrid.errors import HybridError
+from hybrid.simulation.extra import needed
 from hybrid.status import StatusCode
-from hybrid.sweep.extra import needed
 from hybrid.sweep.job import Job, computed
 from hybrid.sweep.outcome import UNFINISHED, Part
 from hybrid.sweep.store import sees_store, write_part

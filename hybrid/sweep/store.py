@@ -21,10 +21,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid import arguments
 from hybrid.errors import ArgumentError, HybridError
+from hybrid.simulation.disk import (
+    as_path,
+    check_facts,
+    flush_folder,
+    replace,
+    text_of,
+    unwritable,
+    write_new,
+)
+from hybrid.simulation.extra import needed
 from hybrid.simulation.seal import SEAL, check_seal, read_file, read_folder, sealed
-from hybrid.sweep.extra import needed
 from hybrid.sweep.outcome import UNFINISHED, Part
 from hybrid.sweep.parts import DamagedError, read_part, written
 from hybrid.sweep.points import RESERVED, Points, as_points
@@ -77,11 +85,11 @@ class Store:
             (folder / PARTS).mkdir(parents=True, exist_ok=True)
             created = {"facts": self.facts, "date": date}
             if not (folder / MADE_BY).exists() and not any((folder / PARTS).glob(f"*{SUFFIX}")):
-                _write_new(folder / MADE_BY, json.dumps(created, indent=1).encode())
+                write_new(folder / MADE_BY, json.dumps(created, indent=1).encode())
             known = _made_by(self.path)
         except OSError as failure:
-            raise _unwritable(self.path, failure) from failure
-        self._compare(known["facts"])
+            raise unwritable(self.path, failure) from failure
+        check_facts(self.path, known["facts"], self.facts)
         self.read_into(sheet)
         latest = {
             "over": {**_listed(self.points), "along": self.along},
@@ -95,29 +103,15 @@ class Store:
             },
             "made_by": {**made_by, "date": known["date"]},
         }
-        self.is_new = _text(latest) != _read(folder / LATEST)
+        self.is_new = _text(latest) != text_of(folder / LATEST)
         if self.is_new or sheet.untouched().any():
             try:
                 # From here on the zarr group, if there is one, is older than the store.
                 (self.path / GROUP).unlink(missing_ok=True)
-                _replace(folder / LATEST, _text(latest).encode())
+                replace(folder / LATEST, _text(latest).encode())
             except OSError as failure:
-                raise _unwritable(self.path, failure) from failure
+                raise unwritable(self.path, failure) from failure
         return str(known["date"])
-
-    def _compare(self, known: Mapping[str, str]) -> None:
-        names = [*known, *(name for name in self.facts if name not in known)]
-        differences = [
-            f"{name} was {arguments.shown(known.get(name, '(none)'))}, "
-            f"and is now {arguments.shown(self.facts.get(name, '(none)'))}"
-            for name in names
-            if known.get(name) != self.facts.get(name)
-        ]
-        if differences:
-            raise ArgumentError(
-                f"store: {str(self.path)!r} was made by another call: {'; '.join(differences)}. "
-                "Name another store, or repeat the call that made this one."
-            )
 
     def read_into(self, sheet: Sheet) -> None:
         """Put the results that other calls and processes have written so far into the sheet."""
@@ -153,12 +147,12 @@ class Store:
         try:
             name, _ = write_part(self.path, part, self.keys)
         except OSError as failure:
-            raise _unwritable(self.path, failure) from failure
+            raise unwritable(self.path, failure) from failure
         self.seen.add(name)
 
     def seal(self) -> str:
         """What a worker must find in the folder to know that it sees this store."""
-        return _read(self.path / INSIDE / MADE_BY)
+        return text_of(self.path / INSIDE / MADE_BY)
 
     def receive(self, name: str, rows: np.ndarray, sheet: Sheet) -> None:
         """Put the results of a file that a worker has written into the sheet."""
@@ -178,7 +172,7 @@ class Store:
             with _Lock(self.path / INSIDE / "lock"):
                 _lay_out(found, self.path)
         except OSError as failure:
-            raise _unwritable(self.path, failure) from failure
+            raise unwritable(self.path, failure) from failure
 
 
 def write_part(path: Path, part: Part, keys: Sequence[bytes] | Mapping[int, bytes]) -> tuple[str, np.ndarray]:
@@ -188,13 +182,13 @@ def write_part(path: Path, part: Part, keys: Sequence[bytes] | Mapping[int, byte
         return "", part.rows[done]
     kept = part.at(part.rows[done], done)
     name = f"{uuid.uuid4().hex}{SUFFIX}"
-    _replace(path / INSIDE / PARTS / name, written(kept, [keys[row] for row in kept.rows.tolist()]))
+    replace(path / INSIDE / PARTS / name, written(kept, [keys[row] for row in kept.rows.tolist()]))
     return name, kept.rows
 
 
 def sees_store(path: Path, seal: str) -> bool:
     """Whether a folder, seen from this machine, is the store with this seal."""
-    return bool(seal) and _read(path / INSIDE / MADE_BY) == seal
+    return bool(seal) and text_of(path / INSIDE / MADE_BY) == seal
 
 
 def open_store(path: str | os.PathLike[str]) -> xarray.Dataset:
@@ -229,13 +223,13 @@ def open_store(path: str | os.PathLike[str]) -> xarray.Dataset:
     where = as_path(path, "path")
     if where.is_file():
         return read_file("path", where)
-    latest = _read(where / INSIDE / LATEST)
+    latest = text_of(where / INSIDE / LATEST)
     # A group without the parts is the copy of a store. Otherwise a damaged group, or one that another call
     # is laying out, is made again from the parts.
     if (where / GROUP).exists() and (not latest or _is_as_laid_out(where)):
         needed("zarr", "open_store")
         # A later call with another grid first removes the file that makes the folder a group.
-        before, found = _read(where / GROUP), None
+        before, found = text_of(where / GROUP), None
         try:
             found = read_folder("path", where)
             # Other datasets that were saved as a group have no seal.
@@ -246,7 +240,7 @@ def open_store(path: str | os.PathLike[str]) -> xarray.Dataset:
             found = None
             if not latest:
                 raise
-        if found is not None and before and before == _read(where / GROUP):
+        if found is not None and before and before == text_of(where / GROUP):
             last = [name for name in RESERVED if name in found.data_vars]
             return found[[name for name in found.data_vars if name not in RESERVED] + last]
     if not latest:
@@ -285,21 +279,6 @@ def _damaged(file: Path) -> HybridError:
     )
 
 
-def as_path(path: object, name: str = "store") -> Path:
-    """A path, or an ArgumentError."""
-    wanted = "be the path of a folder"
-    text = os.fspath(path) if isinstance(path, str | os.PathLike) else ""
-    if not isinstance(text, str) or not text:
-        raise arguments.refusal(name, wanted, path)
-    try:
-        os.lstat(text)
-    except (FileNotFoundError, NotADirectoryError, PermissionError):
-        pass
-    except (OSError, ValueError) as error:  # no file can have such a name
-        raise arguments.refusal(name, wanted, path) from error
-    return Path(text)
-
-
 def _listed(points: Points) -> dict[str, Any]:
     """Points as JSON; numbers keep all their digits."""
     return {
@@ -331,67 +310,6 @@ def _text(value: Any) -> str:
     return json.dumps(value, default=str)
 
 
-def _read(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        return ""
-
-
-def _temporary(path: Path) -> Path:
-    return path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
-
-
-def _replace(path: Path, content: bytes) -> None:
-    """Write a file that is complete whenever it can be seen, also after a loss of power."""
-    part = _temporary(path)
-    try:
-        _write(part, content)
-        os.replace(part, path)
-    except BaseException:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
-        raise
-    _flush_folder(path.parent)
-
-
-def _write_new(path: Path, content: bytes) -> None:
-    """Write a complete file, unless another process was first."""
-    part = _temporary(path)
-    try:
-        _write(part, content)
-        with suppress(FileExistsError):
-            os.link(part, path)
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
-    _flush_folder(path.parent)
-
-
-def _write(path: Path, content: bytes) -> None:
-    with path.open("xb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def _flush_folder(folder: Path) -> None:
-    # Windows cannot open folders.
-    with suppress(OSError):
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
-
-
-def _unwritable(path: Path, failure: OSError) -> HybridError:
-    return HybridError(
-        f"store: {str(path)!r} cannot be written: {failure}. All parts that were complete before are kept. "
-        "Mend the cause, and call again: only what is missing is computed."
-    )
-
-
 def _lay_out(found: xarray.Dataset, path: Path) -> None:
     """Write a dataset as a zarr group; the file that makes the folder a group comes last."""
     for left in path.glob(".new-*"):
@@ -410,15 +328,15 @@ def _lay_out(found: xarray.Dataset, path: Path) -> None:
             if each.name != GROUP:
                 os.replace(each, path / each.name)
         os.replace(new / GROUP, path / GROUP)
-        _flush_folder(path)
-        _replace(path / INSIDE / LAID_OUT, _checksum(path).encode())
+        flush_folder(path)
+        replace(path / INSIDE / LAID_OUT, _checksum(path).encode())
     finally:
         shutil.rmtree(new, ignore_errors=True)
 
 
 def _is_as_laid_out(path: Path) -> bool:
     """Whether the zarr group holds what was laid out: all of its files, to the last bit."""
-    told = _read(path / INSIDE / LAID_OUT)
+    told = text_of(path / INSIDE / LAID_OUT)
     try:
         return bool(told) and (path / GROUP).exists() and told == _checksum(path)
     except OSError:  # another process is laying it out

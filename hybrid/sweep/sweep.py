@@ -13,8 +13,8 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.display.progress import progress_bar
-from hybrid.sweep.extra import load_xarray
-from hybrid.sweep.identity import attributes_of, facts_of
+from hybrid.simulation.extra import load_xarray
+from hybrid.simulation.identity import attributes_of, facts_of
 from hybrid.sweep.job import Job
 from hybrid.sweep.local import run_in_threads
 from hybrid.sweep.outcome import Part

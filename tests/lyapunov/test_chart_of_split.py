@@ -5,7 +5,7 @@ import pytest
 
 import hybrid
 import lyapunov
-from hybrid.sweep.identity import facts_of
+from hybrid.simulation.identity import facts_of
 from hybrid.transform import splitter
 
 STEPS = (-0.6, 0.0, 0.6)

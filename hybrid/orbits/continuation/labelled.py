@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybrid.orbits.labelled import table_at
+from hybrid.orbits.listed import of_bifurcations
 from hybrid.simulation.labelled import Names, attributes, with_outputs
 from hybrid.simulation.seal import sealed
 
@@ -17,8 +19,6 @@ if TYPE_CHECKING:
 KIND = "branch"
 # What variables at the bifurcations have behind their names.
 THERE = "_there"
-# Whether orbits beside a bifurcation are stable, as numbers.
-SIDES = {None: -1, False: 0, True: 1}
 
 
 def dataset_of(branch: Any) -> xarray.Dataset:
@@ -36,17 +36,7 @@ def dataset_of(branch: Any) -> xarray.Dataset:
         "period": ("point", branch.period, names.of("t")),
         "multipliers": (("point", "multiplier"), branch.multipliers.astype(complex)),
         "stable": ("point", branch.stable),
-        "kind": ("bifurcation", np.array([each.kind for each in found], dtype=str)),
-        "value": (
-            "bifurcation",
-            np.array([each.value for each in found], dtype=float),
-            names.of(branch.name),
-        ),
-        "message": ("bifurcation", np.array([each.message for each in found], dtype=str)),
-        "stable_beside": (
-            ("bifurcation", "side"),
-            np.array([[SIDES[side] for side in each.stable] for each in found], dtype=int).reshape(-1, 2),
-        ),
+        **of_bifurcations(found, names.of(branch.name)),
         "x0_there": (("bifurcation", "state"), np.array([each.x0 for each in orbits]).reshape(-1, n)),
         "mode_there": ("bifurcation", np.array([each.mode for each in orbits], dtype=str)),
         "t0_there": ("bifurcation", np.array([each.t0 for each in orbits], dtype=float)),
@@ -55,7 +45,7 @@ def dataset_of(branch: Any) -> xarray.Dataset:
             ("bifurcation", "multiplier"),
             np.array([each.multipliers for each in orbits], dtype=complex).reshape(-1, directions),
         ),
-        "position": ("bifurcation", np.array([each.position for each in found], dtype=int)),
+        **_coefficients(found, n),
     }
     for name, values in branch.outputs.items():
         unit = {"units": branch.output_units[name]} if name in branch.output_units else {}
@@ -71,3 +61,17 @@ def dataset_of(branch: Any) -> xarray.Dataset:
         "outputs_there": (("bifurcation",), table_at(branch.system, [*branch.system.outputs], orbits)),
     }
     return sealed(with_outputs(made, branch.system, tables))
+
+
+def _coefficients(found: Sequence[Any], n: int) -> dict[str, Any]:
+    """Coefficients of bifurcations: numbers, and vectors of those that have one per component; else nan."""
+    numbers, vectors = np.full(len(found), np.nan), np.full((len(found), n), np.nan)
+    for i, each in enumerate(found):
+        if isinstance(each.coefficient, np.ndarray):
+            vectors[i, : len(each.coefficient)] = each.coefficient
+        elif each.coefficient is not None:
+            numbers[i] = each.coefficient
+    return {
+        "coefficient": ("bifurcation", numbers),
+        "coefficients": (("bifurcation", "state"), vectors),
+    }

@@ -23,11 +23,12 @@ from hybrid.system.graph import HybridSystem
 
 OfArc = Callable[[HybridArc], float]
 
-# Variables that the dataset of a branch or a curve has in any case.
+# Variables that the dataset of a branch, a curve or a diagram has in any case.
 TAKEN = (
     *("x0", "mode", "t0", "period", "multipliers", "stable", "kind", "value", "message", "stable_beside"),
     *("position", "outputs", "point", "bifurcation", "state", "output", "multiplier", "side", "unit"),
-    "output_unit",
+    *("output_unit", "coefficient", "coefficients", "eigenvalues", "admissible", "other_modes", "barrier"),
+    *("branch", "family", "parent", "parent_bifurcation", "states", "directions", "made_by"),
 )
 
 

@@ -12,8 +12,8 @@ from hybrid import arguments
 from hybrid.display.tables import counted
 from hybrid.orbits.equilibria.equations import Equations
 from hybrid.orbits.equilibria.equilibrium import Equilibrium, described
+from hybrid.orbits.equilibria.labelled import dataset_of
 from hybrid.orbits.kinds import of_kinds
-from hybrid.simulation.labelled import Names, attributes, with_outputs
 from hybrid.simulation.quantities import Asked, table_of
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
@@ -165,26 +165,10 @@ class EquilibriumBranch(Asked):
     def to_xarray(self) -> xarray.Dataset:
         """The branch over the axis ``point``, with the parameter as a coordinate, and its bifurcations.
 
-        Eigenvalues are complex: ``.to_zarr`` saves them, netCDF cannot.
+        Eigenvalues are complex: ``.to_zarr`` saves them, netCDF cannot. :func:`hybrid.open_branch` makes a
+        branch of it again.
         """
-        import xarray
-
-        names, found = Names(self.system.state_names, self.system.units), self.bifurcations
-        there = np.array([each.equilibrium.x for each in found]).reshape(-1, self.system.dimension)
-        variables: dict[str, Any] = {
-            "x": (("point", "state"), self.x, names.states),
-            "eigenvalues": (("point", "eigenvalue"), self.eigenvalues),
-            "stable": ("point", self.stable),
-            "admissible": ("point", self.admissible),
-            "kind": ("bifurcation", np.array([each.kind for each in found], dtype=str)),
-            "value": ("bifurcation", np.array([each.value for each in found]), names.of(self.name)),
-            "message": ("bifurcation", np.array([each.message for each in found], dtype=str)),
-            "x_there": (("bifurcation", "state"), there, names.states),
-        }
-        coords = {self.name: ("point", self.parameter, names.of(self.name)), **names.coords()}
-        made_by = attributes("branch of equilibria", self.status, self.system, self.equilibrium(0).parameters)
-        made = xarray.Dataset(variables, coords, {**made_by, "parameter": self.name, "mode": self.mode})
-        return with_outputs(made, self.system, {"outputs": (("point",), self._table(self.system.outputs))})
+        return dataset_of(self)
 
 
 KINDS = ("fold", "Hopf", "branch point", "boundary")

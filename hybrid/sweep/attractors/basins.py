@@ -13,6 +13,7 @@ import numpy as np
 from hybrid.compiler.interrupts import CTRL_C
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
+from hybrid.simulation.extra import load_xarray
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names
 from hybrid.solvers import Solver
@@ -24,7 +25,6 @@ from hybrid.sweep.attractors.runs import CODE, NONE, OWNER, POINTS, runs_of
 from hybrid.sweep.attractors.search import FIRST_POINTS, Search, known_of
 from hybrid.sweep.attractors.setup import Setup, digest, setup_of
 from hybrid.sweep.attractors.starts import Grid, axes_of, grid_of
-from hybrid.sweep.extra import load_xarray
 from hybrid.sweep.local import cores
 from hybrid.sweep.sheet import flags
 from hybrid.sweep.sweep import sweep

@@ -13,6 +13,7 @@ from hybrid import arguments
 from hybrid.compiler.interrupts import CTRL_C
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
+from hybrid.simulation.extra import load_xarray
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.solvers import Solver
@@ -24,7 +25,6 @@ from hybrid.sweep.attractors.search import Search
 from hybrid.sweep.attractors.setup import Setup, digest, setup_of
 from hybrid.sweep.attractors.starts import axes_of, sample_of
 from hybrid.sweep.attractors.text import read, written
-from hybrid.sweep.extra import load_xarray
 from hybrid.sweep.sweep import sweep
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem

@@ -6,7 +6,7 @@ import pytest
 
 import hybrid
 from hybrid import Guard, HybridSystem, Mode, ModelError, Reset, Transition, from_equations, simulate, split
-from hybrid.sweep.identity import facts_of
+from hybrid.simulation.identity import facts_of
 
 PLANE = ("q", "v")
 

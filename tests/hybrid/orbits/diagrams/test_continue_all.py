@@ -21,7 +21,7 @@ from hybrid import (
     switch_branch,
 )
 from hybrid.measures import amplitude, maximum
-from hybrid.orbits.continuation.same import is_known
+from hybrid.orbits.diagrams.same import is_known
 from hybrid.plot import plot
 
 SOLVER = Taylor(rtol=1e-12, atol=1e-14)

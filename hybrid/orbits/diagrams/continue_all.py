@@ -14,10 +14,10 @@ from hybrid.display.progress import progress_bar
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
 from hybrid.orbits.continuation.continue_orbit import continue_orbit
-from hybrid.orbits.continuation.diagram import Diagram, Origin
-from hybrid.orbits.continuation.same import is_known
 from hybrid.orbits.continuation.switch_branch import switch_branch
 from hybrid.orbits.continuation.watch import OfArc, checked_outputs
+from hybrid.orbits.diagrams.diagram import Diagram, Origin
+from hybrid.orbits.diagrams.same import is_known
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation, EquilibriumBranch
 from hybrid.orbits.equilibria.continue_equilibrium import continue_equilibrium
 from hybrid.orbits.equilibria.equilibrium import Equilibrium

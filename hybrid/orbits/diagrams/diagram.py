@@ -6,14 +6,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import attrs
-import numpy as np
 
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
 from hybrid.orbits.continuation.event import KINDS
+from hybrid.orbits.diagrams.joined import dataset_of
 from hybrid.orbits.equilibria.branch import KINDS as OF_EQUILIBRIA
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation, EquilibriumBranch
 from hybrid.orbits.kinds import of_kinds
-from hybrid.simulation.labelled import Names, attributes
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
 
@@ -49,6 +48,9 @@ class Diagram:
         What was not followed, in words.
     status
         Whether all was followed that the call asks for.
+    sweep
+        What was given as ``sweep=``, within the span, with the number of the ``branch`` on which each
+        attractor lies, -1 if on none; None if no sweep was given.
 
     Examples
     --------
@@ -66,6 +68,7 @@ class Diagram:
     outputs: Mapping[str, Any]
     notes: tuple[str, ...]
     status: Status
+    sweep: xarray.Dataset | None = None
 
     @property
     def bifurcations(self) -> tuple[Bifurcation | EquilibriumBifurcation, ...]:
@@ -104,46 +107,10 @@ class Diagram:
     def to_xarray(self) -> xarray.Dataset:
         """All points over the axis ``point``, with the number of their branch, and all bifurcations.
 
-        ``period`` is nan for equilibria, and so are values of ``outputs=``, which are numbers of orbits.
-        """
-        import xarray
+        ``period`` is nan for equilibria, and so are values of ``outputs=``, which are numbers of orbits. What
+        was seen in a sweep has ``sweep.`` before its names.
 
-        names = Names(self.system.state_names, self.system.units)
-        n = self.system.dimension
-        periods, states, modes = [], [], []
-        for each in self.branches:
-            if isinstance(each, Branch):
-                periods.append(each.period)
-                states.append(each.x0[:, :n])
-                modes.append(each.mode.astype(str))
-            else:
-                periods.append(np.full(len(each), np.nan))
-                states.append(each.x)
-                modes.append(np.full(len(each), each.mode))
-        found = [(i, each) for i, branch in enumerate(self.branches) for each in branch.bifurcations]
-        variables: dict[str, Any] = {
-            "branch": ("point", np.repeat(np.arange(len(self)), [len(each) for each in self.branches])),
-            "x0": (("point", "state"), np.concatenate(states), names.states),
-            "mode": ("point", np.concatenate(modes).astype(str)),
-            "period": ("point", np.concatenate(periods), names.of("t")),
-            "stable": ("point", np.concatenate([each.stable for each in self.branches])),
-            "kind": ("bifurcation", np.array([each.kind for _, each in found], dtype=str)),
-            "value": ("bifurcation", np.array([each.value for _, each in found]), names.of(self.name)),
-            "branch_there": ("bifurcation", np.array([i for i, _ in found], dtype=int)),
-            "message": ("bifurcation", np.array([each.message for _, each in found], dtype=str)),
-            "parent": ("family", np.array([-1 if each is None else each.branch for each in self.origins])),
-        }
-        for name in self.outputs:
-            variables[name] = (
-                "point",
-                np.concatenate(
-                    [
-                        each.outputs[name] if isinstance(each, Branch) else np.full(len(each), np.nan)
-                        for each in self.branches
-                    ]
-                ),
-            )
-        values = np.concatenate([each.parameter for each in self.branches])
-        coords = {self.name: ("point", values, names.of(self.name)), **names.coords()}
-        made_by = attributes("diagram", self.status, self.system)
-        return xarray.Dataset(variables, coords, {**made_by, "parameter": self.name})
+        Multipliers are complex: ``.to_zarr`` saves them, netCDF cannot. :func:`hybrid.open_diagram` makes a
+        diagram of it again.
+        """
+        return dataset_of(self)

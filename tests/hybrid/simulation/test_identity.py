@@ -10,7 +10,7 @@ import pytest
 
 import hybrid
 import models
-from hybrid.sweep.identity import attributes_of, facts_of, model_of
+from hybrid.simulation.identity import attributes_of, facts_of, model_of
 
 FACTOR = 2.0
 

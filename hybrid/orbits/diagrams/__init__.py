@@ -1,0 +1,1 @@
+"""Whole diagrams: branches that bifurcations join, and those that sweeps show."""
