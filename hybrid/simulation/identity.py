@@ -37,17 +37,25 @@ def facts_of(task: Callable[..., Any]) -> dict[str, str]:
     A task may have an attribute ``facts`` that maps names to values. Otherwise the facts are the code of the
     function, and the values that the function takes from elsewhere: closure, defaults, global names.
     """
-    found: dict[str, str] = {"task": name_of(task)}
-    given = getattr(task, "facts", None)
+    given, found = getattr(task, "facts", None), {"task": name_of(task)}
     if given is None:
         found["code of the task"] = _hash(_own_code(task))
-        found |= {name: _described(value, set()) for name, value in _taken(task).items()}
-    else:
-        found |= {str(name): _described(value, set()) for name, value in given.items()}
-    found["Python"] = ".".join(platform.python_version_tuple()[:2])
-    found["hybrid"] = version()
-    found["kernels"] = kernels_key()[:DIGITS]
-    return found
+    return {**found, **facts_from(_taken(task) if given is None else given)}
+
+
+def facts_from(given: Mapping[str, Any]) -> dict[str, str]:
+    """Values that decide a result, by name, as texts; and what the library and its kernels are."""
+    return {
+        **{str(name): _described(value, set()) for name, value in given.items()},
+        "Python": ".".join(platform.python_version_tuple()[:2]),
+        "hybrid": version(),
+        "kernels": kernels_key()[:DIGITS],
+    }
+
+
+def model_hash(system: HybridSystem) -> str:
+    """A text that stands for a model, as in the attribute of that name of a sweep."""
+    return _hash(_described(system, set()))
 
 
 def attributes_of(task: Callable[..., Any]) -> dict[str, Any]:

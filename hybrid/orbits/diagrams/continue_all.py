@@ -2,36 +2,30 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
-
-import attrs
-import numpy as np
+import os
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from hybrid import arguments
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import progress_bar
 from hybrid.errors import ArgumentError
-from hybrid.orbits.continuation.branch import Bifurcation, Branch
-from hybrid.orbits.continuation.continue_orbit import continue_orbit
-from hybrid.orbits.continuation.switch_branch import switch_branch
 from hybrid.orbits.continuation.watch import OfArc, checked_outputs
-from hybrid.orbits.diagrams.diagram import Diagram, Origin
-from hybrid.orbits.diagrams.same import is_known
-from hybrid.orbits.equilibria.branch import EquilibriumBifurcation, EquilibriumBranch
-from hybrid.orbits.equilibria.continue_equilibrium import continue_equilibrium
+from hybrid.orbits.diagrams.diagram import Diagram
+from hybrid.orbits.diagrams.leads import Lead, Start, numbers_of
+from hybrid.orbits.diagrams.seen import seen_of
+from hybrid.orbits.diagrams.store import DiagramStore
+from hybrid.orbits.diagrams.walker import How, Walker
 from hybrid.orbits.equilibria.equilibrium import Equilibrium
 from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.simulation.identity import facts_from
 from hybrid.simulation.plan import check_solver
+from hybrid.simulation.seal import SEAL, sealed
 from hybrid.solvers import Solver, Taylor
-from hybrid.status import SUCCESS, Status, StatusCode
+from hybrid.transform.aged import original_of
 
-# Bifurcations from which another branch is followed. At the others the branch goes on by itself.
-SWITCHED = ("flip", "branch point", "Hopf", "boundary")
-# A bifurcation this near to the one at which its branch was found is that one, in units of the range.
-SAME_VALUE = 1e-6
-
-Start = PeriodicOrbit | Equilibrium
+if TYPE_CHECKING:
+    import xarray
 
 
 def continue_all(
@@ -41,7 +35,9 @@ def continue_all(
     *,
     depth: int = 2,
     most: int = 50,
+    sweep: xarray.Dataset | None = None,
     outputs: Mapping[str, OfArc] | None = None,
+    store: str | os.PathLike[str] | None = None,
     solver: Solver | None = None,
     max_steps: int = 2000,
     progress: bool | None = None,
@@ -52,18 +48,30 @@ def continue_all(
     equilibria, the other branch is followed too, down to a depth. A branch that is known already is not
     followed again.
 
+    No bifurcation joins an isola to another branch. A sweep finds it if it has a stable part: each attractor
+    that a sweep has seen is compared with the branches, and where it is on none it is closed by Newton's
+    method and followed, too. What is on no branch in the end, such as chaos, is listed.
+
     Parameters
     ----------
     start
-        From `periodic_orbit` or `equilibrium`, or several of them.
+        From `periodic_orbit` or `equilibrium`, or several of them, at values of the parameter that may
+        differ; all other parameters are the same. Those on a branch of another one add none.
     parameter, span
         As for `continue_orbit`; the span contains the value of each start.
     depth
-        How many switches lead from a start to a branch at most.
+        How many switches lead from a start, or from an attractor of the sweep, to a branch at most.
     most
         Largest number of branches.
+    sweep
+        What ``basin_fractions(system, over, along={parameter: values}, starts=20)`` has seen, at the
+        parameters of the start and, of a forced system, at its phase ``t0``. Values out of the span are left
+        out. Periodic motion of more than 8 points is listed, and not followed.
     outputs
         Functions of an arc, by name, as of `continue_orbit`; for branches of orbits.
+    store
+        Folder of a store. Each branch is written when it is done, and the same call again goes on from
+        there; `open_diagram` opens it. Needs the extra ``grid``.
     solver
         Method and tolerances for orbits, by default ``Taylor(rtol=1e-12, atol=1e-14)``.
     max_steps
@@ -79,7 +87,8 @@ def continue_all(
     Raises
     ------
     ArgumentError
-        If an argument does not fit, as for `continue_orbit` and `continue_equilibrium`.
+        If an argument does not fit, as for `continue_orbit` and `continue_equilibrium`; if the store was made
+        by another call; the text names the difference.
 
     Examples
     --------
@@ -93,25 +102,59 @@ def continue_all(
     >>> len(diagram), [each.kind for each in diagram[0].bifurcations]
     (2, ['branch point'])
     """
-    starts = [start] if isinstance(start, PeriodicOrbit | Equilibrium) else _listed(start)
+    starts = _checked_starts(start, parameter, span)
     depth, most = arguments.count("depth", depth, 0), arguments.count("most", most, 1)
     progress = None if progress is None else arguments.flag("progress", progress)
     method = Taylor(rtol=1e-12, atol=1e-14) if solver is None else check_solver(solver)
-    walker = _Walker(parameter, span, checked_outputs(outputs, starts[0].system), method, max_steps)
-    waiting: deque[tuple[Start, int, Origin | None]] = deque((each, 0, None) for each in starts)
-    stopped = False
-    with progress_bar(None, "Diagram", progress, "branch") as bar:
-        while waiting and len(walker.branches) < most and not stopped:
-            first, level, origin = waiting.popleft()
-            if any(is_known(first, branch, method) for branch in walker.branches):
-                continue
-            branch = walker.follow(first, origin)
-            bar.update(True)
-            stopped = branch.status.code == StatusCode.INTERRUPTED
-            if level < depth and not stopped:
-                there = walker.switched(len(walker.branches) - 1)
-                waiting += [(found, level + 1, at) for found, at in there]
-    return walker.diagram(left=len(waiting), stopped=stopped)
+    measured = checked_outputs(outputs, starts[0].system)
+    steps = arguments.count("max_steps", max_steps, 1)
+    how = How(original_of(starts[0].system), parameter, span, depth, measured, method, steps)
+    seen = None if sweep is None else seen_of(sweep, starts[0], parameter, span, method)
+    kept = None if store is None else DiagramStore(store, _facts(how, starts, sweep))
+    walker = Walker(how, [Lead(each) for each in starts], seen, kept)
+    with CTRL_C, progress_bar(None, "Diagram", progress, "branch") as bar:
+        with CTRL_C.ending():
+            walker.walk(most, bar)
+        found = walker.diagram(stopped=CTRL_C.is_set())
+    if kept is not None:
+        kept.finish(found.to_xarray())
+    return found
+
+
+def _facts(how: How, starts: Sequence[Start], sweep: xarray.Dataset | None) -> dict[str, str]:
+    """What decides a diagram, by name."""
+    given = {
+        "model": how.system,
+        "parameter": how.parameter,
+        "span": tuple(map(float, how.span)),
+        "depth": how.depth,
+        "max_steps": how.max_steps,
+        "solver": how.solver,
+        "sweep": None if sweep is None else sealed(sweep.drop_attrs()).attrs[SEAL],
+        **{f"output_{name}": each for name, each in how.outputs.items()},
+        **{f"start {i + 1}": numbers_of(each) for i, each in enumerate(starts)},
+    }
+    return facts_from(given)
+
+
+def _checked_starts(start: object, parameter: str, span: tuple[float, float]) -> list[Start]:
+    """The starts, which are of one model with one set of the other parameters."""
+    starts = [start] if isinstance(start, PeriodicOrbit | Equilibrium) else _listed(start)
+    first = starts[0]
+    arguments.known("parameter: Parameter", parameter, first.system.parameters, "Parameters")
+    for i, each in enumerate(starts):
+        if original_of(each.system).state_names != original_of(first.system).state_names:
+            raise ArgumentError(
+                f"start[{i}] is one of another system than start[0]: give those of one system."
+            )
+        arguments.span_around("span", span, parameter, each.parameters[parameter])
+        for name, value in each.parameters.items():
+            if name != parameter and value != first.parameters[name]:
+                raise ArgumentError(
+                    f"start[{i}] has {name} = {value}, and start[0] has {name} = {first.parameters[name]}: "
+                    f"all parameters but {parameter!r} must be the same."
+                )
+    return starts
 
 
 def _listed(start: object) -> list[Start]:
@@ -121,87 +164,3 @@ def _listed(start: object) -> list[Start]:
         if not isinstance(each, PeriodicOrbit | Equilibrium):
             raise arguments.refusal("start", wanted, each)
     return found
-
-
-@attrs.define(eq=False)
-class _Walker:
-    """Branches that have been followed, and how."""
-
-    parameter: str
-    span: tuple[float, float]
-    outputs: Mapping[str, OfArc]
-    solver: Solver
-    max_steps: int
-    branches: list[Branch | EquilibriumBranch] = attrs.field(factory=list)
-    origins: list[Origin | None] = attrs.field(factory=list)
-    notes: list[str] = attrs.field(factory=list)
-
-    def follow(self, start: Start, origin: Origin | None) -> Branch | EquilibriumBranch:
-        """The branch of a start, which is kept."""
-        branch: Branch | EquilibriumBranch
-        options: dict[str, Any] = {"max_steps": self.max_steps, "progress": False}
-        if isinstance(start, Equilibrium):
-            branch = continue_equilibrium(start, self.parameter, self.span, **options)
-        else:
-            options |= {"outputs": self.outputs or None, "solver": self.solver}
-            branch = continue_orbit(start, self.parameter, self.span, **options)
-        if not branch.status.ok and branch.status.code != StatusCode.INTERRUPTED:
-            self.notes.append(f"Branch {len(self.branches)}: {branch.status.message}")
-        self.branches.append(branch)
-        self.origins.append(origin)
-        return branch
-
-    def switched(self, i: int) -> Iterator[tuple[Start, Origin]]:
-        """What begins or crosses at the bifurcations of a branch."""
-        for each in self.branches[i].bifurcations:
-            if each.kind not in SWITCHED or self._is_origin(i, each):
-                continue
-            if isinstance(each, Bifurcation) and each.kind == "Hopf":
-                # The branch of cycles begins there; the equilibrium is not an orbit.
-                continue
-            if isinstance(each, EquilibriumBifurcation) and each.kind == "boundary" and not each.modes:
-                continue
-            try:
-                found = switch_branch(each, solver=self.solver)
-            except ArgumentError as why:
-                self.notes.append(f"Branch {i}, {each.kind} at {self.parameter} = {each.value:.10g}: {why}")
-                continue
-            low, high = sorted(self.span)
-            if low <= found.parameters[self.parameter] <= high:
-                yield found, Origin(i, each)
-
-    def _is_origin(self, i: int, each: Bifurcation | EquilibriumBifurcation) -> bool:
-        """Whether a branch was found at a bifurcation."""
-        origin = self.origins[i]
-        near = SAME_VALUE * abs(self.span[1] - self.span[0])
-        if origin is None or abs(origin.bifurcation.value - each.value) > near:
-            return False
-        one, other = origin.bifurcation, each
-        if not (isinstance(one, EquilibriumBifurcation) and isinstance(other, EquilibriumBifurcation)):
-            return True
-        sizes = np.abs(one.equilibrium.x) + np.abs(other.equilibrium.x)
-        return bool(np.all(np.abs(one.equilibrium.x - other.equilibrium.x) <= SAME_VALUE * sizes.max()))
-
-    def diagram(self, left: int, stopped: bool) -> Diagram:
-        """All that was followed."""
-        count = len(self.branches)
-        told = f"{count} branches." if count != 1 else "1 branch."
-        status = attrs.evolve(SUCCESS, message=told)
-        if stopped:
-            status = Status(StatusCode.INTERRUPTED, f"Interrupted after {told}", "Call again for the rest.")
-        elif left:
-            status = Status(
-                StatusCode.NOT_CONVERGED, f"{told} {left} more starts were not followed.", "Raise most=."
-            )
-        elif self.notes:
-            status = attrs.evolve(SUCCESS, message=f"{told} See .notes for what was not followed.")
-        first = self.branches[0]
-        return Diagram(
-            system=first.system,
-            name=self.parameter,
-            branches=tuple(self.branches),
-            origins=tuple(self.origins),
-            outputs=dict(self.outputs),
-            notes=tuple(self.notes),
-            status=status,
-        )

@@ -60,9 +60,8 @@ def dataset_of(diagram: Any) -> xarray.Dataset:
     made = xarray.Dataset(variables, coords, made_by)
     if diagram.sweep is not None:
         seen = diagram.sweep.rename({name: f"{SWEEP}{name}" for name in _names_in(diagram.sweep)})
-        made = made.merge(seen.drop_attrs(deep=False)).assign_attrs(
-            {**made_by, "sweep": json.dumps({str(key): str(each) for key, each in seen.attrs.items()})}
-        )
+        told = json.dumps({str(key): value for key, value in seen.attrs.items()}, default=str)
+        made = made.merge(seen.drop_attrs(deep=False)).assign_attrs({**made_by, "sweep": told})
     return sealed(made)
 
 
@@ -83,7 +82,7 @@ def sweep_of(saved: xarray.Dataset) -> xarray.Dataset | None:
     if "sweep" not in saved.attrs:
         return None
     names = [name for name in saved.variables if str(name).startswith(SWEEP)]
-    found = saved[names].drop_vars([name for name in saved.coords if name not in names])
+    found = saved[names].drop_vars([name for name in saved.coords if name not in names], errors="ignore")
     found = found.rename({name: str(name).removeprefix(SWEEP) for name in _names_in(found)})
     return found.drop_attrs(deep=False).assign_attrs(json.loads(saved.attrs["sweep"]))
 

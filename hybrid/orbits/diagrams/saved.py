@@ -16,6 +16,7 @@ from hybrid.orbits.continuation.saved import orbits_from
 from hybrid.orbits.diagrams.diagram import Diagram, Origin
 from hybrid.orbits.diagrams.joined import KIND as OF_DIAGRAMS
 from hybrid.orbits.diagrams.joined import measures_of, part_of, sweep_of
+from hybrid.orbits.diagrams.store import diagram_in
 from hybrid.orbits.equilibria.branch import EquilibriumBranch
 from hybrid.orbits.equilibria.labelled import KIND as OF_EQUILIBRIA
 from hybrid.orbits.equilibria.saved import equilibria_from
@@ -73,7 +74,7 @@ def open_diagram(system: HybridSystem, saved: xarray.Dataset | str | os.PathLike
     system
         The model, which is not saved.
     saved
-        The dataset, or the folder of zarr (or the file) where it is.
+        The dataset, or the folder of zarr (or the file) where it is; or the store of `continue_all`.
 
     Returns
     -------
@@ -98,6 +99,8 @@ def open_diagram(system: HybridSystem, saved: xarray.Dataset | str | os.PathLike
     (2, 'Hopf')
     """
     as_system("system", system)
+    if isinstance(saved, str | os.PathLike):
+        saved = diagram_in(Path(saved))
     found = _read(saved, "diagram", (OF_DIAGRAMS,))
     _check_states(system, "diagram", [str(each) for each in found.state.values])
     branches = tuple(

@@ -34,6 +34,8 @@ from hybrid.transform.aged import original_of, with_age
 if TYPE_CHECKING:
     import xarray
 
+# Points of an attractor in the dataset, at most.
+SHOWN = 128
 # Random starts that are decided together: an interrupt loses those of one batch.
 BATCH = 512
 WANTED = 'be None, or map one parameter to its values, as {"w": np.linspace(0.8, 1.2, 41)}'
@@ -89,10 +91,11 @@ def basin_fractions(
     -------
     xarray.Dataset
         Over the axis ``label`` (-1: violates every mode, 0: no attractor, 1, 2, ...): ``fraction`` and its
-        ``standard_error``, ``kind``, ``round`` and ``jumps`` of the attractors, as in
-        :class:`hybrid.Attractor`. With ``along`` also over the axis of the parameter: there the
-        labels count attractors in the order in which they appear; ``first`` and ``last`` are the values
-        between which each of them lives.
+        ``standard_error``, ``kind``, ``round``, ``period`` and ``jumps`` of the attractors, and up to 128 of
+        their ``points`` with the modes there, as in :class:`hybrid.Attractor`. With ``along`` also over the
+        axis of the parameter: there the labels count attractors in the order in which they appear; ``first``
+        and ``last`` are the values between which each of them lives. :func:`hybrid.continue_all` compares
+        such a dataset with branches.
 
     Raises
     ------
@@ -223,37 +226,67 @@ def _dataset(
     """Shares over labels, and over the values of a parameter if there is one."""
     import xarray
 
-    known = [each for each in found if each is not None]
-    most = max((max(each["labels"], default=0) for each in known), default=0)
+    most = max((max(each["labels"], default=0) for each in found if each is not None), default=0)
     labels = np.arange(-1, most + 1)
-    shape = len(found), len(labels)
-    fraction, error, jumps = (np.full(shape, np.nan) for _ in range(3))
-    rounds, kind = np.zeros(shape, dtype=np.int64), np.full(shape, "", dtype=object)
-    for i, each in enumerate(found):
-        if each is None:
-            continue
-        counts = dict(zip(each["labels"], each["counts"], strict=True)) | {-1: each["beyond"]}
-        if each["starts"]:
-            counts[0] = each["starts"] - sum(counts.values())
-            fraction[i] = [counts.get(int(label), 0) / each["starts"] for label in labels]
-            error[i] = np.sqrt(fraction[i] * (1 - fraction[i]) / each["starts"])
-        for label, one in zip(each["labels"], each["found"], strict=True):
-            place = i, label + 1
-            kind[place], rounds[place], jumps[place] = (
-                one.attractor.kind,
-                one.attractor.round,
-                one.attractor.jumps,
-            )
-    columns = {"fraction": fraction, "standard_error": error, "kind": kind, "round": rounds, "jumps": jumps}
+    columns = {**_shares(found, labels), **_attractors(found, labels, setup.system.dimension)}
     names = Names(setup.system.state_names, dict(setup.system.units))
     used = {**setup.system.parameters, **setup.parameters}
-    made_by = attributes("fractions", status, setup.system, used)
-    coords: dict[str, Any] = {"label": labels}
+    made_by = {**attributes("fractions", status, setup.system, used), "t0": setup.t0}
+    inner = {"points": ("point", "state"), "mode_of_point": ("point",)}
+    units = {"period": names.of("t"), "points": names.states}
+    coords: dict[str, Any] = {"label": labels, **names.coords()}
     if name is None:
-        return xarray.Dataset({key: ("label", each[0]) for key, each in columns.items()}, coords, made_by)
+        return xarray.Dataset(
+            {key: (("label", *inner.get(key, ())), each[0], units.get(key)) for key, each in columns.items()},
+            coords,
+            made_by,
+        )
     coords[name] = (name, values, names.of(name))
-    variables: dict[str, Any] = {key: ((name, "label"), each) for key, each in columns.items()}
-    lives = [values[kind[:, i] != ""] for i in range(len(labels))]
+    variables: dict[str, Any] = {
+        key: ((name, "label", *inner.get(key, ())), each, units.get(key)) for key, each in columns.items()
+    }
+    lives = [values[columns["kind"][:, i] != ""] for i in range(len(labels))]
     for key, end in (("first", 0), ("last", -1)):
         variables[key] = ("label", np.array([each[end] if len(each) else np.nan for each in lives]))
     return xarray.Dataset(variables, coords, made_by)
+
+
+def _shares(found: list[dict[str, Any] | None], labels: np.ndarray) -> dict[str, np.ndarray]:
+    """Shares of the starts ``(N, labels)`` with their errors."""
+    fraction, error = (np.full((len(found), len(labels)), np.nan) for _ in range(2))
+    for i, each in enumerate(found):
+        if each is None or not each["starts"]:
+            continue
+        counts = dict(zip(each["labels"], each["counts"], strict=True)) | {-1: each["beyond"]}
+        counts[0] = each["starts"] - sum(counts.values())
+        fraction[i] = [counts.get(int(label), 0) / each["starts"] for label in labels]
+        error[i] = np.sqrt(fraction[i] * (1 - fraction[i]) / each["starts"])
+    return {"fraction": fraction, "standard_error": error}
+
+
+def _attractors(
+    found: list[dict[str, Any] | None], labels: np.ndarray, dimension: int
+) -> dict[str, np.ndarray]:
+    """What is known of the attractors ``(N, labels)``, and some of their points, filled up with nan."""
+    there = [
+        (i, label + 1, one.attractor)
+        for i, each in enumerate(found)
+        if each is not None
+        for label, one in zip(each["labels"], each["found"], strict=True)
+    ]
+    shape, most = (len(found), len(labels)), max((len(each.points[:SHOWN]) for *_, each in there), default=0)
+    made: dict[str, np.ndarray] = {
+        "kind": np.full(shape, "", dtype=object),
+        "round": np.zeros(shape, dtype=np.int64),
+        "period": np.full(shape, np.nan),
+        "jumps": np.full(shape, np.nan),
+        "points": np.full((*shape, most, dimension), np.nan),
+        "mode_of_point": np.full((*shape, most), "", dtype=object),
+    }
+    for i, j, attractor in there:
+        for name in ("kind", "round", "period", "jumps"):
+            made[name][i, j] = getattr(attractor, name)
+        shown = attractor.points[:SHOWN]
+        made["points"][i, j, : len(shown)] = shown
+        made["mode_of_point"][i, j, : len(shown)] = attractor.mode[:SHOWN]
+    return made
