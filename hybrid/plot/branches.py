@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,7 @@ from hybrid.orbits.labelled import table_at
 from hybrid.plot.datasets import SECTION, column
 from hybrid.plot.style import COLOURS, axes_for, dot_area, named_quantity, small_legend
 from hybrid.simulation.labelled import Names
+from hybrid.simulation.quantities import mode_indices, table_of
 
 if TYPE_CHECKING:
     import xarray
@@ -242,6 +244,10 @@ def plot_diagram(
 ) -> Axes:
     """Draw all branches of a diagram into one picture, each in a colour of its own; as :func:`plot_branch`.
 
+    Below them are dots for what the sweep of the diagram has reached, if it has one: of a component or an
+    output the points of the attractors; of a function in ``outputs=`` its value once around each orbit, and
+    over single forcing periods of other motion.
+
     Parameters
     ----------
     diagram
@@ -279,12 +285,36 @@ def plot_diagram(
             name = measure.name
         shown.append((each, name))
     (ax,) = axes_for(ax, 1, (6.4, 4.2), figsize)
+    if diagram.sweep is not None:
+        _draw_points(ax, "sweep", *_reached(diagram, y))
     for i, (branch, name) in enumerate(shown):
         plot_branch(branch, name, over=None if i else over, ax=ax)
     for branch, _ in shown:
         if isinstance(branch, Branch):
             ax.set_ylabel(_label_of(branch, _quantity_of(branch, y)))
     return ax
+
+
+def _reached(diagram: Diagram, y: str | int) -> tuple[np.ndarray, np.ndarray]:
+    """Parameter and values ``(N,)`` of what the sweep of a diagram has reached."""
+    sweep, system, name = diagram.sweep, diagram.system, diagram.name
+    assert sweep is not None
+    if isinstance(y, str) and y in diagram.outputs:
+        values = sweep["reached"].sel(measured=y).values
+        at = np.broadcast_to(sweep[name].values[:, None, None], values.shape)
+    else:
+        asked = named_quantity("y", system, y)
+        states = sweep["points"].sel(state=[*system.state_names]).values
+        there = np.isfinite(states).all(axis=-1)
+        at = np.broadcast_to(sweep[name].values[:, None, None], there.shape)[there]
+        known = system.parameter_values(json.loads(sweep.attrs["model_parameters"]))
+        table = np.tile(known, (len(at), 1))
+        table[:, [*system.parameters].index(name)] = at
+        modes = mode_indices(system, sweep["mode_of_point"].values[there])
+        times = np.full(len(at), float(sweep.attrs["t0"]))
+        values = table_of(system, [asked], times, states[there], modes, table)[:, 0]
+    good = np.isfinite(values)
+    return at[good], values[good]
 
 
 def plot_curve(

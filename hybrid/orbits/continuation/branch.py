@@ -15,7 +15,7 @@ from hybrid.orbits.continuation.change import Change
 from hybrid.orbits.continuation.event import KINDS, OfThisProcess
 from hybrid.orbits.continuation.labelled import dataset_of
 from hybrid.orbits.continuation.place import Place
-from hybrid.orbits.kinds import of_kinds
+from hybrid.orbits.kinds import comes_back, of_kinds
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.simulation.quantities import Asked, mode_indices, quantity, table_of
 from hybrid.status import Status
@@ -205,6 +205,11 @@ class Branch(Asked):
             If there is no such point.
         """
         return self._orbit(arguments.index("i", i, len(self)))
+
+    @property
+    def closed(self) -> bool:
+        """Whether the branch comes back to its start, as an isola does; its last point is then the first."""
+        return comes_back(self.parameter, self.x0)
 
     def __len__(self) -> int:
         return len(self.parameter)

@@ -147,6 +147,8 @@ def _checked_starts(start: object, parameter: str, span: tuple[float, float]) ->
             raise ArgumentError(
                 f"start[{i}] is one of another system than start[0]: give those of one system."
             )
+        if not (each.closes if isinstance(each, PeriodicOrbit) else each.status.ok):
+            raise ArgumentError(f"start[{i}] has not converged: {each.status.message}")
         arguments.span_around("span", span, parameter, each.parameters[parameter])
         for name, value in each.parameters.items():
             if name != parameter and value != first.parameters[name]:

@@ -102,6 +102,8 @@ class Diagram:
             kinds[each.kind] = kinds.get(each.kind, 0) + 1
         found = ", ".join(f"{count} {kind}" for kind, count in kinds.items()) or "no bifurcations"
         many = f"{len(self)} branches" if len(self) != 1 else "1 branch"
+        closed = sum(each.closed for each in self.branches)
+        many += f", {closed} closed" if closed else ""
         return f"<Diagram of {many}, {self.name} = {low:.6g} to {high:.6g}, {found}, {self.status.brief}>"
 
     def to_xarray(self) -> xarray.Dataset:

@@ -14,12 +14,20 @@ from hybrid.orbits.equilibria.equations import Equations, reduced
 from hybrid.orbits.equilibria.equilibrium import Equilibrium
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.periodic_orbit import periodic_orbit
+from hybrid.simulation.arc import HybridArc
 from hybrid.solvers import Solver
+from hybrid.system.graph import HybridSystem
+from hybrid.system.periodicity import closed_change
+from hybrid.transform.aged import original_of, without_age
 
 # Two orbits are one if their periods and states differ by less, in units of the period and of the orbit.
 SAME_PERIOD, SAME_STATE = 1e-7, 1e-5
 # States along an autonomous orbit that are compared, which are this near to each other at least.
 ALONG, NEAR = 4000, 2e-3
+# A component that moves by a smaller share of its size stands still.
+STILL = 1e-9
+# Orbits are compared at so much of a turn behind their points.
+ASIDE = 0.382
 
 
 def is_known(found: PeriodicOrbit | Equilibrium, branch: Branch | EquilibriumBranch, solver: Solver) -> bool:
@@ -38,7 +46,10 @@ def _is_on(found: Equilibrium, branch: EquilibriumBranch) -> bool:
     u = np.append(found.x[:n], found.parameters[branch.name])
     units = np.maximum(np.abs(points).max(axis=0), np.ptp(points, axis=0))
     units[units == 0.0] = 1.0
-    i = int(np.argmin(np.linalg.norm((points - u) / units, axis=1)))
+    change = closed_change(points - u, np.append(found.system.turn_lengths[:n], 0.0))
+    i = int(np.argmin(np.linalg.norm(change / units, axis=1)))
+    # Without whole turns.
+    u = points[i] - change[i]
     vector = found.system.parameter_values(branch.equilibrium(i).parameters)
     equations = Equations(found.system, found.mode, (branch.name,), branch.x[i], vector)
     beside = (points[min(i + 1, len(points) - 1)] - points[max(i - 1, 0)]) / units
@@ -87,15 +98,31 @@ def _is_same(found: PeriodicOrbit, near: PeriodicOrbit, solver: Solver) -> bool:
         return False
     if not at.closes or abs(at.period - found.period) > SAME_PERIOD * found.period:
         return False
-    arc, n = at.arc(), found.system.dimension
+    arc, x = at.arc(), found.x0
     if forced:
-        # The states at the phase of the orbit that was found.
+        # The states at a phase beside that of the orbit that was found, at which there may be a jump.
         turn = at.period / at.forcing_periods
-        times = at.t0 + (found.t0 - at.t0) % turn + turn * np.arange(at.forcing_periods)
-        least = SAME_STATE
+        phase = found.t0 + ASIDE * turn
+        times = at.t0 + (phase - at.t0) % turn + turn * np.arange(at.forcing_periods)
+        times, x, least = np.clip(times, arc.t[0], arc.t[-1]), found.arc()(phase), SAME_STATE
     else:
         times, least = np.linspace(arc.t[0], arc.t[-1], ALONG), NEAR
-    sizes = np.ptp(arc.x[:, :n], axis=0)
-    sizes[sizes == 0.0] = 1.0
-    apart = np.abs(arc(times)[:, :n] - found.x0[:n]) / sizes
-    return bool(apart.max(axis=1).min() <= least)
+    return bool(distances(found.system, arc, times, x).min() <= least)
+
+
+def distances(system: HybridSystem, arc: HybridArc, times: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """How far states of an arc at some times are from a state ``(N,)``, in units of what components move.
+
+    Whole turns of angles do not count, nor do counters and the time since the entry of a mode.
+    """
+    system = original_of(system)
+    n = system.tangent_dimension
+    states, sizes, x = (without_age(system, each)[..., :n] for each in (arc(times), extents(arc), x))
+    return np.asarray((np.abs(closed_change(states - x, system.turn_lengths[:n])) / sizes).max(axis=-1))
+
+
+def extents(arc: HybridArc) -> np.ndarray:
+    """How far the components move along an arc ``(n,)``; of one that stands still to rounding its size."""
+    moved, sizes = np.ptp(arc.x, axis=0), np.abs(arc.x).max(axis=0)
+    still = moved <= STILL * sizes
+    return np.where(still, np.where(sizes > 0.0, sizes, 1.0), moved)

@@ -17,7 +17,7 @@ from hybrid.display.tables import counted
 from hybrid.errors import ArgumentError, HybridError
 from hybrid.orbits.continuation.branch import Branch
 from hybrid.orbits.continuation.watch import OfArc
-from hybrid.orbits.diagrams.same import SAME_STATE, is_known
+from hybrid.orbits.diagrams.same import ASIDE, SAME_STATE, distances, is_known
 from hybrid.orbits.equilibria.branch import EquilibriumBranch
 from hybrid.orbits.equilibria.equilibrium import Equilibrium, equilibrium
 from hybrid.orbits.orbit import PeriodicOrbit
@@ -137,20 +137,18 @@ class Seen:
 
         orbit = shot(max(count, 1))
         for rounds in range(1, count if orbit.closes else 1):
-            if count % rounds == 0 and _comes_back(orbit, rounds / count):
+            if count % rounds == 0 and _comes_back(orbit, count, rounds):
                 return shot(rounds)
         return orbit
 
     def _is_near(self, orbit: PeriodicOrbit, x: np.ndarray) -> bool:
         """Whether Newton's method has stayed at the attractor, of which this is a point."""
-        arc, n = orbit.arc(), min(len(x), len(orbit.x0))
-        states, near = orbit.x0[None], NEAR
+        arc, times, near = orbit.arc(), np.array([orbit.t0]), NEAR
         if orbit.system.period is None:
             # The point of an autonomous orbit is another one.
-            states, near = arc(np.linspace(arc.t[0], arc.t[-1], ALONG)), NEAR + 2.0 * np.pi / ALONG
-        sizes = np.maximum(np.ptp(arc.x[:, :n], axis=0), np.abs(arc.x[:, :n]).max(axis=0))
-        apart = np.abs(states[:, :n] - x[:n]) / np.where(sizes > 0.0, sizes, 1.0)
-        return bool(apart.max(axis=1).min() <= near)
+            times, near = np.linspace(arc.t[0], arc.t[-1], ALONG), NEAR + 2.0 * np.pi / ALONG
+        times = np.clip(times, arc.t[0], arc.t[-1])
+        return bool(distances(self.system, arc, times, x).min() <= near)
 
     def parameters_at(self, place: Place) -> dict[str, float]:
         """All parameters of a place."""
@@ -215,11 +213,12 @@ class Seen:
                 yield [_number(each, arc) for each in functions]
 
 
-def _comes_back(orbit: PeriodicOrbit, share: float) -> bool:
-    """Whether an orbit is back at its point after a share of its period."""
-    arc = orbit.arc()
-    apart = np.abs(arc(arc.t[0] + share * orbit.period) - orbit.x0)
-    return bool(np.all(apart <= SAME_STATE * np.maximum(np.ptp(arc.x, axis=0), np.abs(arc.x).max(axis=0))))
+def _comes_back(orbit: PeriodicOrbit, count: int, rounds: int) -> bool:
+    """Whether an orbit of so many rounds repeats after some of them, at a phase where no clock ticks."""
+    arc, turn = orbit.arc(), orbit.period / count
+    here = arc.t[0] + ASIDE * turn
+    apart = distances(orbit.system, arc, np.array([here + rounds * turn]), arc(here))
+    return bool(apart[0] <= SAME_STATE)
 
 
 def _number(function: Callable[[Any], float], arc: Any) -> float:

@@ -203,9 +203,9 @@ class Walker:
         if stopped:
             status = Status(StatusCode.INTERRUPTED, f"Interrupted after {found}.", "Call again for the rest.")
         elif left or unseen:
-            told = [f"{counted(len(left), 'start')} more"] if left else []
+            told = [counted(len(left), "more start")] if left else []
             told += [f"{counted(unseen, 'attractor')} of the sweep"] if unseen else []
-            message = f"{found}. Not followed: {' and '.join(told)}."
+            message = f"{found}. Not looked at: {' and '.join(told)}."
             status = Status(StatusCode.NOT_CONVERGED, message, "Raise most=.")
         elif notes:
             status = attrs.evolve(SUCCESS, message=f"{found}. See .notes for what was not followed.")

@@ -13,7 +13,7 @@ from hybrid.display.tables import counted
 from hybrid.orbits.equilibria.equations import Equations
 from hybrid.orbits.equilibria.equilibrium import Equilibrium, described
 from hybrid.orbits.equilibria.labelled import dataset_of
-from hybrid.orbits.kinds import of_kinds
+from hybrid.orbits.kinds import comes_back, of_kinds
 from hybrid.simulation.quantities import Asked, table_of
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
@@ -144,6 +144,11 @@ class EquilibriumBranch(Asked):
             If there is no such kind.
         """
         return of_kinds(self.bifurcations, kinds, KINDS)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the branch comes back to its start, as an isola does; its last point is then the first."""
+        return comes_back(self.parameter, self.x)
 
     def __len__(self) -> int:
         return len(self.parameter)

@@ -56,7 +56,7 @@ def test_depth_and_number_of_branches():
     few = continue_all(rest, "a", (-3.0, 9.0), most=2)
     assert len(few) == 2
     assert not few.status.ok
-    assert "more starts were not followed" in few.status.message
+    assert "Not looked at: 2 more starts." in few.status.message
 
 
 def test_the_valve_flutters_hits_its_seat_and_doubles_its_period():
