@@ -18,6 +18,8 @@ import models
 from hybrid import (
     DOP853,
     HybridSystem,
+    basin_fractions,
+    continue_all,
     continue_equilibrium,
     continue_orbit,
     equilibrium,
@@ -26,8 +28,8 @@ from hybrid import (
     stroboscopic_section,
     switch_branch,
 )
-from hybrid.measures import maximum
-from hybrid.plot import COLOURS, plot_arc, plot_branch, plot_graph, plot_phase
+from hybrid.measures import amplitude, maximum
+from hybrid.plot import COLOURS, plot_arc, plot_branch, plot_diagram, plot_graph, plot_phase
 from lyapunov import chart
 from lyapunov.plot import plot_chart, style
 from lyapunov.study.diagram import diagram, draw
@@ -150,6 +152,18 @@ def equilibria_picture(folder: Path) -> None:
     save(axes.figure, folder / "equilibria.png")
 
 
+def diagram_picture(folder: Path) -> None:
+    """The branches of the impact oscillator, an isola among them, with what a sweep has reached."""
+    oscillator = models.impact_oscillator()
+    free = periodic_orbit(oscillator, (0.1, 0.0), parameters={"w": 1.5})
+    over, along = {"x": (-2.0, 0.9), "v": (-2.0, 2.0)}, {"w": np.linspace(1.3, 3.1, 37)}
+    seen = basin_fractions(oscillator, over, along=along, starts=10, periods=300)
+    whole = continue_all(free, "w", (1.3, 3.1), sweep=seen, outputs={"amplitude": amplitude("x")})
+    axes = plot_diagram(whole, "amplitude", figsize=(6.4, 3.4))
+    axes.set_xlabel("forcing frequency w")
+    save(axes.figure, folder / "diagram.png")
+
+
 def save(figure: Any, path: Path) -> None:
     figure.savefig(path, metadata={"Software": None})
     plt.close(figure)
@@ -180,6 +194,7 @@ def main() -> None:
         chart_picture(system, folder)
         branch_picture(folder)
         equilibria_picture(folder)
+        diagram_picture(folder)
 
 
 if __name__ == "__main__":

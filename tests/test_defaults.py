@@ -66,11 +66,12 @@ DEFAULTS = {
     hybrid.continue_bifurcation: {"outputs": None, "solver": None, "max_steps": 500, "progress": None},
     hybrid.equilibrium: {"mode": None, "parameters": None, "max_iterations": 60},
     hybrid.continue_all: {
-        **{"depth": 2, "most": 50, "outputs": None},
+        **{"depth": 2, "most": 50, "sweep": None, "outputs": None, "store": None},
         **{"solver": None, "max_steps": 2000, "progress": None},
     },
     hybrid.continue_equilibrium: {"max_steps": 2000, "progress": None},
     hybrid.open_branch: {},
+    hybrid.open_diagram: {},
     hybrid.open_end: {},
     hybrid.filippov: {"start": None, **SYSTEM},
     hybrid.from_equations: {**PLAIN, "modes": None, "repeats": ()},

@@ -269,7 +269,7 @@ def plot_diagram(
     >>> from hybrid.measures import maximum
     >>> from hybrid.plot import plot_diagram
     >>> rest = hybrid.equilibrium(models.relief_valve(), (2.5, 0.0, 12.5))
-    >>> diagram = hybrid.continue_all(rest, "q", (8.0, 9.0), outputs={"top": maximum("y")})
+    >>> diagram = hybrid.continue_all(rest, "q", (7.0, 10.0), outputs={"top": maximum("y")})
     >>> ax = plot_diagram(diagram, "top")
     >>> ax.get_xlabel(), ax.get_ylabel()
     ('q', 'top')

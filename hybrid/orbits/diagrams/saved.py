@@ -93,7 +93,7 @@ def open_diagram(system: HybridSystem, saved: xarray.Dataset | str | os.PathLike
     >>> import hybrid, models
     >>> valve = models.relief_valve()
     >>> rest = hybrid.equilibrium(valve, (2.5, 0.0, 12.5))
-    >>> diagram = hybrid.continue_all(rest, "q", (8.0, 9.0))
+    >>> diagram = hybrid.continue_all(rest, "q", (7.0, 10.0))
     >>> again = hybrid.open_diagram(valve, diagram.to_xarray())
     >>> len(again), again.origins[1].bifurcation.kind
     (2, 'Hopf')

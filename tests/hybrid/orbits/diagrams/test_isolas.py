@@ -128,7 +128,7 @@ def test_cycles_on_an_isola_in_closed_form():
 
 
 def test_a_pendulum_turns_where_its_rest_ends():
-    """Rests whole turns apart are one. Rotations begin at the fold ``T = 1``, where their period is infinite."""
+    """Rests whole turns apart are one. Rotations begin at the fold, where their period is infinite."""
     system = HybridSystem(
         state=("phi", "w"),
         parameters={"c": 4.0, "T": 0.5},
