@@ -68,11 +68,6 @@ def _bifurcation(
     system: HybridSystem, known: Mapping[str, float], name: str, row: xarray.Dataset, measured: list[str]
 ) -> Bifurcation:
     value = float(row["value"])
-    vector = row["coefficients"].values
-    coefficient: float | np.ndarray | None = vector[np.isfinite(vector)]
-    if not np.size(coefficient):
-        number = float(row["coefficient"])
-        coefficient = None if np.isnan(number) else number
     return Bifurcation(
         kind=str(row["kind"].values),
         parameter=name,
@@ -80,10 +75,18 @@ def _bifurcation(
         orbit=_orbit(system, {**known, name: value}, row, "_there"),
         message=str(row["message"].values),
         stable=saved_sides(row),
-        coefficient=coefficient,
+        coefficient=_coefficient(row),
         position=int(row["position"]),
         outputs={each: float(row[f"{each}{THERE}"]) for each in measured},
     )
+
+
+def _coefficient(row: xarray.Dataset) -> float | np.ndarray | None:
+    vector, number = row["coefficients"].values, float(row["coefficient"])
+    vector = vector[np.isfinite(vector)]
+    if len(vector):
+        return np.asarray(vector)
+    return None if np.isnan(number) else number
 
 
 def _orbit(

@@ -68,7 +68,7 @@ class Diagram:
     outputs: Mapping[str, Any]
     notes: tuple[str, ...]
     status: Status
-    sweep: xarray.Dataset | None = None
+    sweep: xarray.Dataset | None
 
     @property
     def bifurcations(self) -> tuple[Bifurcation | EquilibriumBifurcation, ...]:

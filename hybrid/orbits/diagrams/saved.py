@@ -100,7 +100,7 @@ def open_diagram(system: HybridSystem, saved: xarray.Dataset | str | os.PathLike
     """
     as_system("system", system)
     if isinstance(saved, str | os.PathLike):
-        saved = diagram_in(Path(saved))
+        saved = diagram_in(saved)
     found = _read(saved, "diagram", (OF_DIAGRAMS,))
     _check_states(system, "diagram", [str(each) for each in found.state.values])
     branches = tuple(

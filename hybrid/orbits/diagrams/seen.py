@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from functools import cached_property
 from itertools import groupby
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from hybrid import arguments
 from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.tables import counted
 from hybrid.errors import ArgumentError, HybridError
+from hybrid.measures.measure import Measure
 from hybrid.orbits.continuation.branch import Branch
 from hybrid.orbits.continuation.watch import OfArc
 from hybrid.orbits.diagrams.same import ASIDE, SAME_STATE, distances, is_known
@@ -22,11 +24,12 @@ from hybrid.orbits.equilibria.branch import EquilibriumBranch
 from hybrid.orbits.equilibria.equilibrium import Equilibrium, equilibrium
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.periodic_orbit import periodic_orbit
+from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.identity import model_hash
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver
 from hybrid.system.graph import HybridSystem
-from hybrid.transform.aged import aged, original_of
+from hybrid.transform.aged import aged, original_of, without_age
 
 if TYPE_CHECKING:
     import xarray
@@ -49,7 +52,7 @@ WANTED = "be a dataset of basin_fractions(..., along={parameter: values})"
 
 
 @attrs.define(eq=False)
-class Seen:
+class SeenAttractors:
     """A sweep over the parameter of a diagram, compared with branches as these are found.
 
     Attributes
@@ -115,7 +118,8 @@ class Seen:
             return None
         try:
             if kind == "equilibrium" and forcing is None:
-                rest = equilibrium(self.system, x[: self.system.dimension], mode=mode, parameters=values)
+                own = without_age(self.system, x)
+                rest = equilibrium(self.system, own, mode=mode, parameters=values)
                 return rest if rest.status.ok else None
             orbit = self._orbit(x, mode, values, count, float(at["period"]))
         except HybridError:
@@ -181,12 +185,14 @@ class Seen:
             return f"{kind}, not found again by Newton's method"
         return {"torus": "motion on a torus", "chaotic": "chaotic motion"}.get(kind, f"motion, {kind}")
 
-    def dataset(self, outputs: dict[str, OfArc]) -> xarray.Dataset:
-        """The sweep with the branches of its attractors, and values of outputs on them."""
-        made = self.sweep.assign({"branch": ((self.name, "label"), self.branch)})
+    def dataset(self, outputs: dict[str, OfArc], count: int) -> xarray.Dataset:
+        """The sweep with the branches of its attractors, so many, and values of outputs on them."""
+        # The last one may have been interrupted before it had a point.
+        known = np.where(self.branch < count, self.branch, -1)
+        made = self.sweep.assign({"branch": ((self.name, "label"), known)})
         if not outputs or CTRL_C.is_set():
             return made
-        shape = (len(outputs), *self.branch.shape, max(made.sizes["point"], 1))
+        shape = (len(outputs), *self.branch.shape, made.sizes["point"])
         values = np.full(shape, np.nan)
         for place in self.places:
             found = np.array([*self._measured(place, [*outputs.values()])])
@@ -198,19 +204,22 @@ class Seen:
         """What functions of an arc make of an attractor: once around its orbit, or over some periods."""
         found = self.closed(place)
         if isinstance(found, Equilibrium):
+            yield [_at_rest(each, found) for each in functions]
             return
-        if found is not None:
-            yield [_number(each, found.arc()) for each in functions]
-            return
-        values = self.parameters_at(place)
+        for arc in self._periods(place) if found is None else [found.arc()]:
+            yield [_number(each, arc) for each in functions]
+
+    def _periods(self, place: Place) -> Iterator[HybridArc]:
+        """Runs over one forcing period from points of an attractor."""
+        values, at = self.parameters_at(place), self._at(place)
         length, t0 = self.system.forcing_period(values), float(self.sweep.attrs["t0"])
-        at = self._at(place)
         points, modes = at["points"].values[:PERIODS], at["mode_of_point"].values[:PERIODS]
-        for x, mode in zip(points, modes, strict=True) if length is not None else ():
-            if np.isfinite(x).all():
-                own = x[: self.system.dimension]
-                arc = simulate(self.system, own, (t0, t0 + length), mode=str(mode), parameters=values)
-                yield [_number(each, arc) for each in functions]
+        for x, mode in zip(points, modes, strict=True):
+            if length is None or not np.isfinite(x).all():
+                return
+            own = without_age(self.system, x)
+            with suppress(HybridError):
+                yield simulate(self.system, own, (t0, t0 + length), mode=str(mode), parameters=values)
 
 
 def _comes_back(orbit: PeriodicOrbit, count: int, rounds: int) -> bool:
@@ -221,6 +230,14 @@ def _comes_back(orbit: PeriodicOrbit, count: int, rounds: int) -> bool:
     return bool(apart[0] <= SAME_STATE)
 
 
+def _at_rest(function: object, rest: Equilibrium) -> float:
+    """What a measure is at an equilibrium; nan for other functions, which need an arc."""
+    if not isinstance(function, Measure):
+        return np.nan
+    value = float(rest[function.name][0])
+    return {"amplitude": 0.0, "rms": abs(value)}.get(function.kind, value)
+
+
 def _number(function: Callable[[Any], float], arc: Any) -> float:
     """What a function makes of an arc; nan if it fails, as it may on motion that no branch has."""
     try:
@@ -229,7 +246,9 @@ def _number(function: Callable[[Any], float], arc: Any) -> float:
         return np.nan
 
 
-def seen_of(given: object, start: Start, name: str, span: tuple[float, float], solver: Solver) -> Seen:
+def seen_of(
+    given: object, start: Start, name: str, span: tuple[float, float], solver: Solver
+) -> SeenAttractors:
     """A sweep that fits a diagram from a start, or an ArgumentError."""
     if not {"kind", "round", "period", "points", "mode_of_point"} <= set(getattr(given, "data_vars", ())):
         raise arguments.refusal("sweep", WANTED, given)
@@ -252,7 +271,7 @@ def seen_of(given: object, start: Start, name: str, span: tuple[float, float], s
         raise ArgumentError(f"sweep has no value of {name!r} within the span ({low}, {high}).")
     texts = {key: inside[key].astype(str) for key in ("kind", "mode_of_point")}
     shape = inside["kind"].transpose(name, "label").shape
-    return Seen(
+    return SeenAttractors(
         sweep=inside.transpose(name, "label", ...).assign(texts),
         system=original_of(start.system),
         parameters=dict(start.parameters),

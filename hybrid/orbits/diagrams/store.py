@@ -100,7 +100,7 @@ class DiagramStore:
                     shutil.rmtree(left)
 
 
-def diagram_in(path: Path) -> Path:
+def diagram_in(path: str | os.PathLike[str]) -> str | os.PathLike[str]:
     """The place of the diagram in a store; the path itself if it is no store.
 
     Raises
@@ -108,14 +108,15 @@ def diagram_in(path: Path) -> Path:
     ArgumentError
         If no call with the store has ended yet.
     """
-    if not (path / MADE_BY).exists():
+    if not os.path.exists(os.path.join(path, MADE_BY)):
         return path
-    if not (path / DIAGRAM).exists():
+    place = os.path.join(path, DIAGRAM)
+    if not os.path.exists(place):
         raise ArgumentError(
-            f"saved: no call with store={str(path)!r} has ended yet. Repeat the call: it goes on from the "
-            "branches that are there."
+            f"saved: no call with store={os.fspath(path)!r} has ended yet. Repeat the call: it goes on from "
+            "the branches that are there."
         )
-    return path / DIAGRAM
+    return place
 
 
 def _is_store_or_empty(path: Path) -> bool:

@@ -22,7 +22,7 @@ from hybrid.orbits.diagrams.diagram import Diagram, Origin
 from hybrid.orbits.diagrams.leads import Lead, Start
 from hybrid.orbits.diagrams.same import is_known
 from hybrid.orbits.diagrams.saved import branch_from
-from hybrid.orbits.diagrams.seen import Seen
+from hybrid.orbits.diagrams.seen import SeenAttractors
 from hybrid.orbits.diagrams.store import DiagramStore
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation, EquilibriumBranch
 from hybrid.orbits.equilibria.continue_equilibrium import continue_equilibrium
@@ -68,7 +68,7 @@ class Walker:
 
     how: How
     leads: list[Lead]
-    seen: Seen | None
+    seen: SeenAttractors | None
     store: DiagramStore | None
     position: int = 0
     branches: list[Branch | EquilibriumBranch] = attrs.field(factory=list)
@@ -217,5 +217,5 @@ class Walker:
             outputs=dict(self.how.outputs),
             notes=tuple(notes),
             status=status,
-            sweep=None if seen is None else seen.dataset(dict(self.how.outputs)),
+            sweep=None if seen is None else seen.dataset(dict(self.how.outputs), len(self.branches)),
         )

@@ -72,7 +72,9 @@ def equilibria(made):
                 "span": span,
                 "depth": COUNT,
                 "most": [0, *COUNT],
+                "sweep": [3, "a", made["swept"], made["branch"].to_xarray()],
                 "outputs": OF_ARC,
+                "store": [3, "", True],
                 "solver": SOLVER,
                 "max_steps": [0, *COUNT],
                 "progress": [3, "a"],
@@ -152,6 +154,10 @@ def methods(made):
         (
             call(hybrid.open_branch, made["branch"].system, made["branch"].to_xarray()),
             {"system": [None, 3, "a"], "saved": [None, 3, "no such folder", made["flip"]]},
+        ),
+        (
+            call(hybrid.open_diagram, made["rest"].system, made["diagram"].to_xarray()),
+            {"system": [None, 3, "a"], "saved": [None, 3, "no such folder", made["branch"].to_xarray()]},
         ),
         (
             call(hybrid.open_end, arc.end.to_xarray()),

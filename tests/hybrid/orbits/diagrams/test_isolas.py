@@ -137,12 +137,19 @@ def test_a_pendulum_turns_where_its_rest_ends():
     )
     over = {"phi": (-3.0, 3.0), "w": 0.0}
     seen = basin_fractions(system, over, along={"T": [-0.5, 0.5, 2.0]}, starts=2, interval=1.0)
-    diagram = continue_all(equilibrium(system, (0.5, 0.0)), "T", (-0.9, 2.5), sweep=seen, max_steps=300)
+    outputs = {"high": maximum("phi"), "wide": amplitude("w"), "long": lambda arc: arc.t[-1] - arc.t[0]}
+    diagram = continue_all(
+        equilibrium(system, (0.5, 0.0)), "T", (-0.9, 2.5), sweep=seen, outputs=outputs, max_steps=300
+    )
     np.testing.assert_array_equal(diagram.sweep["branch"].values[:, 2], [0, 0, 1])
     rest, rotations = diagram
     assert rest.of("fold")[0].value == pytest.approx(1.0, abs=1e-9)
     assert rotations.parameter.min() == pytest.approx(1.0, abs=1e-3)
     assert rotations.period.max() > 100.0
+    high, wide, long = diagram.sweep["reached"].values[..., 2, 0]
+    assert np.sin(high[:2]) == pytest.approx([-0.5, 0.5], abs=1e-9)
+    np.testing.assert_array_equal(wide[:2], 0.0)
+    np.testing.assert_array_equal(np.isnan(long), [True, True, False])
 
 
 def logistic():
