@@ -13,6 +13,7 @@ from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.watch import OfArc, checked_outputs
 from hybrid.orbits.diagrams.diagram import Diagram
 from hybrid.orbits.diagrams.leads import Lead, Start, numbers_of
+from hybrid.orbits.diagrams.same import is_same_value
 from hybrid.orbits.diagrams.seen import seen_of
 from hybrid.orbits.diagrams.store import DiagramStore
 from hybrid.orbits.diagrams.walker import How, Walker
@@ -151,9 +152,10 @@ def _checked_starts(start: object, parameter: str, span: tuple[float, float]) ->
             raise ArgumentError(f"start[{i}] has not converged: {each.status.message}")
         arguments.span_around("span", span, parameter, each.parameters[parameter])
         for name, value in each.parameters.items():
-            if name != parameter and value != first.parameters[name]:
+            known = first.parameters[name]
+            if name != parameter and not is_same_value(value, known):
                 raise ArgumentError(
-                    f"start[{i}] has {name} = {value}, and start[0] has {name} = {first.parameters[name]}: "
+                    f"start[{i}] has {name} = {value:.12g}, and start[0] has {name} = {known:.12g}: "
                     f"all parameters but {parameter!r} must be the same."
                 )
     return starts

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -24,6 +25,7 @@ from hybrid.transform.aged import original_of, without_age
 SAME_PERIOD, SAME_STATE = 1e-7, 1e-5
 # States along an autonomous orbit that are compared, which are this near to each other at least.
 ALONG, NEAR = 4000, 2e-3
+ROUNDING = 1e-13
 # A component that moves by a smaller share of its size stands still.
 STILL = 1e-9
 # Orbits are compared at so much of a turn behind their points.
@@ -37,6 +39,11 @@ def is_known(found: PeriodicOrbit | Equilibrium, branch: Branch | EquilibriumBra
     if isinstance(found, PeriodicOrbit) and isinstance(branch, Branch):
         return any(_is_same(found, near, solver) for near in _near(branch, found.parameters[branch.name]))
     return False
+
+
+def is_same_value(one: float, other: float) -> bool:
+    """Whether two values of a parameter are the same up to rounding."""
+    return math.isclose(one, other, rel_tol=ROUNDING)
 
 
 def _is_on(found: Equilibrium, branch: EquilibriumBranch) -> bool:
@@ -70,8 +77,10 @@ def _near(branch: Branch, value: float) -> Iterator[PeriodicOrbit]:
     numbers: list[int | PeriodicOrbit] = [*range(len(branch))]
     for bifurcation in reversed(branch.bifurcations):
         numbers.insert(bifurcation.position, bifurcation.orbit)
+    # The end of a span may be missed by rounding.
+    beside = ROUNDING * max(abs(value), float(np.abs(values).max()))
     for i in range(len(values) - 1):
-        if min(values[i : i + 2]) <= value <= max(values[i : i + 2]):
+        if min(values[i : i + 2]) - beside <= value <= max(values[i : i + 2]) + beside:
             for each in numbers[i : i + 2]:
                 yield branch.orbit(each) if isinstance(each, int) else each
 

@@ -19,7 +19,7 @@ from hybrid.errors import ArgumentError, HybridError
 from hybrid.measures.measure import Measure
 from hybrid.orbits.continuation.branch import Branch
 from hybrid.orbits.continuation.watch import OfArc
-from hybrid.orbits.diagrams.same import ASIDE, SAME_STATE, distances, is_known
+from hybrid.orbits.diagrams.same import ASIDE, SAME_STATE, distances, is_known, is_same_value
 from hybrid.orbits.equilibria.branch import EquilibriumBranch
 from hybrid.orbits.equilibria.equilibrium import Equilibrium, equilibrium
 from hybrid.orbits.orbit import PeriodicOrbit
@@ -292,10 +292,10 @@ def _check_model(dataset: Any, start: Start, name: str) -> None:
     others = {
         key: (value, start.parameters[key])
         for key, value in given.items()
-        if key != name and value != start.parameters[key]
+        if key != name and not is_same_value(value, start.parameters[key])
     }
     if others:
-        told = ", ".join(f"{key} = {one} and {other}" for key, (one, other) in others.items())
+        told = ", ".join(f"{key} = {one:.12g} and {other:.12g}" for key, (one, other) in others.items())
         raise ArgumentError(f"sweep has other parameters than the start: {told}. Make both with the same.")
     period = start.system.forcing_period(start.parameters)
     if period is None or not isinstance(start, PeriodicOrbit):
