@@ -50,7 +50,8 @@ class Diagram:
         Whether all was followed that the call asks for.
     sweep
         What was given as ``sweep=``, within the span, with the number of the ``branch`` on which each
-        attractor lies, -1 if on none; None if no sweep was given.
+        attractor lies, -1 if on none, and with what it has ``reached``: the values of ``outputs``. None if no
+        sweep was given.
 
     Examples
     --------

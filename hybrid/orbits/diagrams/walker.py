@@ -35,6 +35,8 @@ from hybrid.system.graph import HybridSystem
 SWITCHED = ("flip", "branch point", "Hopf", "boundary")
 # A bifurcation this near to the one at which its branch was found is that one, in units of the range.
 SAME_VALUE = 1e-6
+# A branch is one that is known if all of so many of its orbits but one are.
+SAMPLES = 5
 
 
 @attrs.frozen(eq=False)
@@ -74,25 +76,32 @@ class Walker:
     branches: list[Branch | EquilibriumBranch] = attrs.field(factory=list)
     origins: list[Origin | None] = attrs.field(factory=list)
     notes: list[str] = attrs.field(factory=list)
+    # How many leads and notes the store has.
+    _written: tuple[int, int] = attrs.field(init=False)
+
+    @_written.default
+    def _given(self) -> tuple[int, int]:
+        return len(self.leads), 0
 
     def walk(self, most: int, bar: Progress) -> None:
         """Follow branches until there are no more, or as many as asked for, or Ctrl-C is pressed."""
         self._resume(most, bar)
         while len(self.branches) < most:
-            before = len(self.leads), len(self.notes)
             lead = self._next()
             if lead is None or CTRL_C.is_set():
                 return
-            branch = self._follow(lead)
-            bar.update(True)
+            self._follow(lead)
             if CTRL_C.is_set():
                 return
+            if lead.origin is None and self._is_repeated():
+                continue
+            bar.update(True)
             if lead.level < self.how.depth:
                 there = self._switched(len(self.branches) - 1)
                 self.leads += [Lead(found, lead.level + 1, at) for found, at in there]
             if CTRL_C.is_set():
                 return
-            self._write(branch, *before)
+            self._write()
 
     def _next(self) -> Lead | None:
         """The next start that is on no branch; when there is none, that of an attractor of the sweep."""
@@ -112,8 +121,29 @@ class Walker:
     def _is_known(self, start: Start) -> bool:
         return any(is_known(start, branch, self.how.solver) for branch in self.branches)
 
-    def _follow(self, lead: Lead) -> Branch | EquilibriumBranch:
-        """The branch of a start, which is kept."""
+    def _is_repeated(self) -> bool:
+        """Whether the last branch is one before, whose start was not known again; it is then left out.
+
+        So it is if Newton's method leads from an orbit near a fold to the other one.
+        """
+        last = len(self.branches) - 1
+        branch = self.branches[last]
+        places = np.linspace(0, len(branch) - 1, SAMPLES + 2)[1:-1].astype(int).tolist()
+        samples: list[Start] = [
+            branch.orbit(i) if isinstance(branch, Branch) else branch.equilibrium(i) for i in places
+        ]
+        for i, other in enumerate(self.branches[:last]):
+            if sum(is_known(each, other, self.how.solver) for each in samples) >= SAMPLES - 1:
+                del self.branches[last], self.origins[last]
+                self.notes = [each for each in self.notes if not each.startswith(f"Branch {last}:")]
+                self.notes.append(f"A start on branch {i} was not known as one: its branch is left out.")
+                if self.seen is not None:
+                    self.seen.branch[self.seen.branch == last] = i
+                return True
+        return False
+
+    def _follow(self, lead: Lead) -> None:
+        """Follow the branch of a start, which is kept."""
         branch: Branch | EquilibriumBranch
         how, start = self.how, lead.start
         options: dict[str, Any] = {"max_steps": how.max_steps, "progress": False}
@@ -126,7 +156,6 @@ class Walker:
             self.notes.append(f"Branch {len(self.branches)}: {branch.status.message}")
         self.branches.append(branch)
         self.origins.append(lead.origin)
-        return branch
 
     def _switched(self, i: int) -> Iterator[tuple[Start, Origin]]:
         """What begins or crosses at the bifurcations of a branch."""
@@ -160,18 +189,19 @@ class Walker:
         sizes = np.abs(one.equilibrium.x) + np.abs(other.equilibrium.x)
         return bool(np.all(np.abs(one.equilibrium.x - other.equilibrium.x) <= SAME_VALUE * sizes.max()))
 
-    def _write(self, branch: Branch | EquilibriumBranch, leads_before: int, notes_before: int) -> None:
-        """Write down a branch that is done, with all that the next one needs."""
+    def _write(self) -> None:
+        """Write down the last branch, with all that the next one needs."""
         if self.store is None:
             return
-        seen = self.seen
+        (some_leads, some_notes), seen = self._written, self.seen
         walk = {
             "position": self.position,
-            "leads": [leads.written(each, self.branches) for each in self.leads[leads_before:]],
-            "notes": self.notes[notes_before:],
+            "leads": [leads.written(each, self.branches) for each in self.leads[some_leads:]],
+            "notes": self.notes[some_notes:],
             "seen": None if seen is None else [seen.position, seen.branch.tolist()],
         }
-        self.store.write(len(self.branches) - 1, branch.to_xarray(), walk)
+        self.store.write(len(self.branches) - 1, self.branches[-1].to_xarray(), walk)
+        self._written = len(self.leads), len(self.notes)
 
     def _resume(self, most: int, bar: Progress) -> None:
         """Take the branches that earlier calls have written."""
@@ -187,6 +217,7 @@ class Walker:
             self.notes += walk["notes"]
             if self.seen is not None:
                 self.seen.position, self.seen.branch = walk["seen"][0], np.array(walk["seen"][1])
+            self._written = len(self.leads), len(self.notes)
             bar.update(True)
 
     def diagram(self, *, stopped: bool) -> Diagram:

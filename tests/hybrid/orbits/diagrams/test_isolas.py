@@ -23,6 +23,8 @@ from hybrid import (
     periodic_orbit,
 )
 from hybrid.measures import amplitude, maximum
+from hybrid.orbits.diagrams import walker
+from hybrid.orbits.diagrams.same import is_known
 from hybrid.plot import plot
 from models.one_impact import one_impact_orbits
 
@@ -209,6 +211,20 @@ def test_a_sweep_that_does_not_fit_is_refused(impacts):
     for text, given in refused.items():
         with pytest.raises(ArgumentError, match=text):
             continue_all(start, "w", span, sweep=given)
+
+
+def test_a_branch_whose_start_was_not_known_again_is_left_out(impacts, monkeypatch):
+    calls = []
+
+    def forgetful(found, branch, solver):
+        calls.append(branch)
+        return len(calls) > 1 and is_known(found, branch, solver)
+
+    monkeypatch.setattr(walker, "is_known", forgetful)
+    starts = [impacts[0].orbit(4), impacts[0].orbit(8)]
+    diagram = continue_all(starts, "w", (1.4, 3.0), depth=0)
+    assert len(diagram) == 1
+    assert diagram.notes == ("A start on branch 0 was not known as one: its branch is left out.",)
 
 
 def test_starts_on_a_known_branch_add_none(impacts):
