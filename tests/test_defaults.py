@@ -22,7 +22,7 @@ SYSTEM = {"period": None, "name": "", "units": None, "angles": None, "outputs": 
 PLAIN = {"parameters": None, **SYSTEM}
 SEARCH = {
     **{**LONG, "progress": None, "section": None, "interval": None, "periods": 1000, "recurrences": 10},
-    "tolerance": 0.01,
+    **{"tolerance": 0.01, "features": None, "together": None},
 }
 SAMPLE = {"seed": 0}
 FIGURE = {"ax": None, "figsize": None}

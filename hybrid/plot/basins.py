@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid import arguments
+from hybrid.display.ranges import described
 from hybrid.display.tables import counted, with_unit
 from hybrid.errors import ArgumentError
 from hybrid.plot.style import COLOURS, axes_for, dot_area
@@ -119,17 +120,28 @@ def _described(basins: xarray.Dataset) -> list[str]:
     for i in range(basins.sizes["attractor"]):
         each = basins.isel(attractor=i)
         share = float((basins.label == i + 1).mean())
-        found.append(
-            f"{i + 1}: {_words(str(each.kind.values), int(each['round']), float(each.jumps), share)}"
-        )
+        motion = _features(each) or _words(str(each.kind.values), int(each["round"]), float(each.jumps))
+        found.append(f"{i + 1}: {motion} ({share:.1%} of the starts)")
     return found
 
 
-def _words(kind: str, points: int, jumps: float, share: float) -> str:
-    motion = kind
+def _features(found: xarray.Dataset) -> str:
+    """The features of an attractor in words; of all values of a parameter if there are several."""
+    if "features" not in found.data_vars:
+        return ""
+    low, high = (found[name] for name in ("lowest_feature", "highest_feature"))
+    along = [dim for dim in low.dims if dim != "feature"]
+    low, high = low.min(along), high.max(along)
+    if not np.isfinite(low.values).all():
+        return ""
+    ends = zip(low.values.tolist(), high.values.tolist(), strict=True)
+    return described(dict(zip(map(str, found.feature.values), ends, strict=True)))
+
+
+def _words(kind: str, points: int, jumps: float) -> str:
     if points and kind == "periodic":
-        motion = f"{kind}, {counted(points, 'point')} and {counted(round(jumps), 'jump')} per round"
-    return f"{motion} ({share:.1%} of the starts)"
+        return f"{kind}, {counted(points, 'point')} and {counted(round(jumps), 'jump')} per round"
+    return kind
 
 
 def _draw_points(ax: Axes, basins: xarray.Dataset, dims: tuple[str, ...], area: float) -> None:
@@ -206,6 +218,9 @@ def plot_fractions(
 def _name(fractions: xarray.Dataset, label: int) -> str:
     if label < 1:
         return "no attractor" if label == 0 else "violates every mode"
+    told = _features(fractions.sel(label=label))
+    if told:
+        return f"{label}: {told}"
     kinds = fractions.kind.sel(label=label).values
     kinds = [str(each) for each in np.atleast_1d(kinds).tolist() if each]
     return f"{label}: {', '.join(dict.fromkeys(kinds))}"

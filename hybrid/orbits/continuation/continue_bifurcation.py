@@ -13,6 +13,7 @@ from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.display.tables import counted
 from hybrid.errors import ArgumentError
+from hybrid.measures.asked import Unmeasured
 from hybrid.orbits.continuation.branch import Bifurcation
 from hybrid.orbits.continuation.clearances import curve_clearance_of
 from hybrid.orbits.continuation.curve import BESIDE, SMOOTH, Curve, Special, Spot, along_curve
@@ -21,7 +22,7 @@ from hybrid.orbits.continuation.monitors import JUMPED
 from hybrid.orbits.continuation.place import Place, place_of, place_on
 from hybrid.orbits.continuation.result import Points, orbit_of, whole_orbit_of
 from hybrid.orbits.continuation.route import Loop
-from hybrid.orbits.continuation.watch import OfArc, Unmeasured, Watch, checked_outputs, units_of
+from hybrid.orbits.continuation.watch import OfArc, Watch, checked_outputs, units_of
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation
 from hybrid.orbits.equilibria.curves import EquilibriumCurve, curve_of
 from hybrid.orbits.orbit import PeriodicOrbit, unaged

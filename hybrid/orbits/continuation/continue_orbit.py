@@ -12,6 +12,7 @@ from hybrid import arguments
 from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.errors import ArgumentError
+from hybrid.measures.asked import Unmeasured
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
 from hybrid.orbits.continuation.crossing import crossing, flip_coefficient, fold_coefficient, is_supercritical
 from hybrid.orbits.continuation.event import KINDS, Event, OfThisProcess
@@ -23,7 +24,6 @@ from hybrid.orbits.continuation.result import Points, mode_at, whole_orbit_of
 from hybrid.orbits.continuation.walk import walk
 from hybrid.orbits.continuation.watch import (
     OfArc,
-    Unmeasured,
     Watch,
     checked_events,
     checked_outputs,

@@ -10,7 +10,8 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
-from hybrid.errors import ArgumentError, HybridError
+from hybrid.errors import ArgumentError
+from hybrid.measures.asked import Unmeasured, answer, told
 from hybrid.measures.measure import Measure
 from hybrid.orbits.continuation.event import KINDS
 from hybrid.orbits.continuation.labelled import THERE
@@ -30,10 +31,6 @@ TAKEN = (
     *("output_unit", "coefficient", "coefficients", "eigenvalues", "admissible", "other_modes", "barrier"),
     *("branch", "family", "parent", "parent_bifurcation", "states", "directions", "made_by"),
 )
-
-
-class Unmeasured(ArgumentError):
-    """A function of an orbit has raised an error, or has given no finite number."""
 
 
 @attrs.frozen(eq=False)
@@ -108,7 +105,7 @@ class Watch:
         try:
             return bool(self.stops(found))
         except Exception as error:
-            raise Unmeasured(f"stop raised {_told(error)} at {_where(orbit)}.") from error
+            raise Unmeasured(f"stop raised {told(error)} at {_where(orbit)}.") from error
 
     def _values(self, argument: str, functions: Mapping[str, OfArc], orbit: Pass) -> dict[str, float]:
         arc = arc_of(orbit, self.points, self.solver)
@@ -122,21 +119,11 @@ class Watch:
 
 
 def _number(title: str, function: OfArc, arc: HybridArc, where: str) -> float:
-    try:
-        found = function(arc)
-    except HybridError as error:
-        raise Unmeasured(f"{title}: {str(error).removesuffix('.')}, at {where}.") from error
-    except Exception as error:
-        raise Unmeasured(f"{title} raised {_told(error)} at {where}.") from error
+    found = answer(title, function, arc, where)
     try:
         return arguments.number(title, found)
     except ArgumentError as error:
         raise Unmeasured(f"{str(error).removesuffix('.')} at {where}.") from error
-
-
-def _told(error: Exception) -> str:
-    said = str(error).removesuffix(".")
-    return f"{type(error).__name__} ({said})" if said else type(error).__name__
 
 
 def _where(orbit: Pass) -> str:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
+from hybrid import arguments
+from hybrid.display.ranges import described
 from hybrid.display.tables import counted, html_table
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.status import Status
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 
 KINDS = ("equilibrium", "periodic", "torus", "chaotic")
 UNKNOWN = "not known"
+# The kind of an attractor that features tell from others.
+BY_FEATURES = "by features"
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -31,7 +35,8 @@ class Attractor:
     ----------
     kind
         ``"equilibrium"``, ``"periodic"``, ``"torus"`` or ``"chaotic"``, by the signs of the exponents: one
-        within two standard errors of zero counts as zero. ``"not known"`` if they could not be computed.
+        within two standard errors of zero counts as zero. ``"not known"`` if they could not be computed,
+        ``"by features"`` for a search by features, which looks for neither a period nor exponents.
     points, mode
         Points of the section ``(P, n)`` and names of their modes ``(P,)``: one round of a periodic orbit, in
         the order in which it visits them; a sample of other attractors.
@@ -47,6 +52,11 @@ class Attractor:
         periodic orbit are the logarithms of its multipliers over the period.
     start
         A state that leads to it ``(n,)``.
+    features
+        Features by name, if the search was by features: those of the run in the middle of the group. The
+        attractor is also a mapping of their names: ``attractor["peak"]``.
+    ranges
+        The lowest and the highest value of each feature among the runs that lead to the attractor.
 
     Examples
     --------
@@ -67,8 +77,22 @@ class Attractor:
     exponents: np.ndarray
     standard_error: np.ndarray
     start: np.ndarray
+    features: Mapping[str, float] = attrs.field(factory=dict)
+    ranges: Mapping[str, tuple[float, float]] = attrs.field(factory=dict)
+
+    def __getitem__(self, name: str) -> float:
+        """The value of a feature.
+
+        Raises
+        ------
+        ArgumentError
+            If the attractor has no such feature.
+        """
+        return self.features[arguments.known("name: Feature", name, self.features, "Features")]
 
     def __repr__(self) -> str:
+        if self.features:
+            return f"<Attractor: {described(self.ranges)}, {self.jumps:.4g} jumps per point>"
         what = f"{self.kind}, {counted(self.round, 'point')}" if self.round else self.kind
         values = ", ".join(f"{value:.4g}" for value in self.exponents)
         return f"<Attractor: {what}, {self.jumps:.4g} jumps, exponents [{values}]>"
@@ -113,11 +137,22 @@ class Attractors(Mapping[int, Attractor]):
 
     def _repr_html_(self) -> str:
         """A table for a notebook."""
+        if any(each.features for each in self._found):
+            return self._features_table()
         rows = [
             [str(label), each.kind, str(each.round or ""), f"{each.jumps:.4g}", f"{each.exponents[0]:.4g}"]
             for label, each in self.items()
         ]
         head = ("label", "kind", "points per round", "jumps", "largest exponent")
+        return f"{html_table(head, rows)}\n<p>{escape(str(self.status))}</p>"
+
+    def _features_table(self) -> str:
+        names = [*self._found[0].features]
+        rows = [
+            [str(label), *(f"{each[name]:.6g}" for name in names), f"{each.jumps:.4g}"]
+            for label, each in self.items()
+        ]
+        head = ("label", *names, "jumps per point")
         return f"{html_table(head, rows)}\n<p>{escape(str(self.status))}</p>"
 
     def to_xarray(self) -> xarray.Dataset:
@@ -145,10 +180,27 @@ class Attractors(Mapping[int, Attractor]):
             "points": (axes, points, self.names.states),
             "mode_of_point": (axes[:2], modes),
         }
+        variables |= feature_variables(found)
         coords = {"attractor": np.arange(1, len(found) + 1), "exponent": np.arange(1, directions + 1)}
+        if found and found[0].features:
+            coords["feature"] = np.array([*found[0].features], dtype=object)
         return xarray.Dataset(
             variables, {**coords, **self.names.coords()}, attributes("attractors", self.status)
         )
+
+
+def feature_variables(found: tuple[Attractor, ...]) -> dict[str, Any]:
+    """Features of attractors and their ranges, over the axes ``attractor`` and ``feature``."""
+    if not found or not found[0].features:
+        return {}
+    over = "attractor", "feature"
+    values = np.array([[*each.features.values()] for each in found])
+    ranges = np.array([[*each.ranges.values()] for each in found])
+    return {
+        "features": (over, values),
+        "lowest_feature": (over, ranges[..., 0]),
+        "highest_feature": (over, ranges[..., 1]),
+    }
 
 
 def unaged(found: tuple[Attractor, ...], system: HybridSystem) -> tuple[tuple[Attractor, ...], HybridSystem]:

@@ -18,10 +18,11 @@ from hybrid.simulation.labelled import Names
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
 from hybrid.sweep.attractors.attractor import Attractors, unaged
+from hybrid.sweep.attractors.featured import search_of
 from hybrid.sweep.attractors.runs import CODE, OWNER
-from hybrid.sweep.attractors.search import Search
 from hybrid.sweep.attractors.setup import Setup, setup_of
 from hybrid.sweep.attractors.starts import axes_of, sample_of
+from hybrid.sweep.attractors.stretches import UNMEASURED, features_in
 from hybrid.sweep.local import cores
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem
@@ -44,11 +45,13 @@ def attractors(
     periods: int = 1000,
     recurrences: int = 10,
     tolerance: float = 0.01,
+    features: Any = None,
+    together: float | Mapping[str, float] | None = None,
     solver: Solver | None = None,
     executor: int | None = None,
     progress: bool | None = None,
 ) -> Attractors:
-    """Attractors that random starts lead to, by recurrences of their runs on a section.
+    """Attractors that random starts lead to, by recurrences of their runs on a section, or by features.
 
     The points of a run are taken once per forcing period; with ``section`` at each crossing of a surface;
     otherwise, for autonomous systems, at equal times. The first run goes on until its points come back: a
@@ -59,6 +62,14 @@ def attractors(
 
     Recurrences suit attractors that are apart on the section. Where those of one kind lie closer together
     than ``tolerance``, lower it; where a start may wander for long before it settles, raise ``periods``.
+
+    With ``features`` each run settles for ``periods`` points, and functions of the arc over its next points
+    give numbers of it. Runs whose features lie together are one attractor, whatever their states do. Runs are
+    joined nearest first (single linkage). The features are taken of two stretches, one after the other, of
+    ``recurrences`` points each. Groups of runs are one attractor if in no feature the gap between them is
+    wider than twice the root mean square of the change from stretch to stretch within one of them, or than
+    the square root of the solver's ``rtol`` times the feature. ``together`` gives the widest gap by hand.
+    A run that ends, or with a feature that is not finite, leads to no attractor.
 
     Parameters
     ----------
@@ -80,10 +91,17 @@ def attractors(
     periods
         Points that a run has to settle.
     recurrences
-        Points in succession near one attractor that decide a start.
+        Points in succession near one attractor that decide a start. With features, the number of points in
+        each of the two stretches: more of them make features of chaos scatter less.
     tolerance
         Two states are near each other if no component differs by more than this share of the distance by
-        which it changes along the attractor's orbit.
+        which it changes along the attractor's orbit. Features do not need it.
+    features
+        What tells attractors apart in place of their points: a function of an arc that gives one number, such
+        as ``maximum("x")`` of `hybrid.measures`; several such functions; or a mapping of names to them.
+    together
+        The widest gap in a feature that a group of runs may have, in the unit of the feature: a number, or a
+        mapping of each feature to one. By default the runs tell it.
     executor
         Number of threads; by default all cores.
     progress
@@ -104,6 +122,13 @@ def attractors(
     G. Datseris, A. Wagemakers, "Effortless estimation of basins of attraction", Chaos 32 (2022) 023104,
     doi:10.1063/5.0076568, is the method on a grid of cells; here distances to the points take the place of
     cells.
+
+    M. Gelbrecht, J. Kurths, F. Hellmann, "Monte Carlo basin bifurcation analysis", New Journal of Physics 22
+    (2020) 033032, doi:10.1088/1367-2630/ab7a05, and M. Stender, N. Hoffmann, "bSTAB: an open-source software
+    for computing the basin stability of multi-stable dynamical systems", Nonlinear Dynamics 107 (2022) 1451,
+    doi:10.1007/s11071-021-06786-5, group runs by features. P. F. Felzenszwalb, D. P. Huttenlocher, "Efficient
+    graph-based image segmentation", International Journal of Computer Vision 59 (2004) 167,
+    doi:10.1023/B:VISI.0000022288.19776.77, join groups by the gap between them and the differences within.
 
     Examples
     --------
@@ -126,13 +151,15 @@ def attractors(
         "periods": periods,
         "recurrences": recurrences,
         "tolerance": tolerance,
+        "features": features,
+        "together": together,
         "solver": solver,
     }
     setup = setup_of(system, origins[np.lexsort(origins.T[::-1])[0]], given)
-    search = Search(setup, threads)
+    search = search_of(setup, threads)
     with CTRL_C, progress_bar(count, "Attractors", as_flag(progress), "start") as bar:
         search.pilot(origins)
-        rows = search.decided(origins, bar)
+        rows = search.judged(origins, search.decided(origins, bar))
         stopped = CTRL_C.is_set()
     found, shown = unaged(search.ordered()[0], setup.system)
     status = (
@@ -153,6 +180,16 @@ def status_of_search(setup: Setup, origins: np.ndarray, rows: np.ndarray) -> Sta
     full = _full(setup, origins, rows)
     if full is not None:
         return full
+    unmeasured = np.flatnonzero(rows[:, CODE] == UNMEASURED)
+    if unmeasured.size and setup.features is not None:
+        values = features_in(rows[unmeasured])[0]
+        names = [name for name, each in zip(setup.features.names, values.T, strict=True) if _lacks(each)]
+        return Status(
+            StatusCode.NOT_CONVERGED,
+            f"{len(unmeasured)} of {len(rows)} starts lead to no attractor, because of features that are not "
+            f"finite: {', '.join(names)}.",
+            "Let each function give a finite number of every run.",
+        )
     undecided = int(np.sum((rows[:, OWNER] < 0) & (rows[:, CODE] == codes.MAX_STEPS)))
     ended = int(np.sum((rows[:, OWNER] < 0) & (rows[:, CODE] > codes.MAX_STEPS)))
     beyond = int(np.sum(rows[:, CODE] == codes.REFUSED))
@@ -168,6 +205,10 @@ def status_of_search(setup: Setup, origins: np.ndarray, rows: np.ndarray) -> Sta
             "Raise periods=, or tolerance= where an attractor is a large set.",
         )
     return Status(StatusCode.SUCCESS, " ".join(["Every start is decided.", *told]))
+
+
+def _lacks(values: np.ndarray) -> bool:
+    return not np.isfinite(values).all()
 
 
 def _full(setup: Setup, origins: np.ndarray, rows: np.ndarray) -> Status | None:

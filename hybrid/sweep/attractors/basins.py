@@ -20,11 +20,13 @@ from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
 from hybrid.sweep.attractors.attractor import Attractors, unaged
 from hybrid.sweep.attractors.attractors import as_flag, status_of_search
+from hybrid.sweep.attractors.featured import search_of
 from hybrid.sweep.attractors.find import Found
-from hybrid.sweep.attractors.runs import CODE, NONE, OWNER, POINTS, runs_of
-from hybrid.sweep.attractors.search import FIRST_POINTS, Search, known_of
+from hybrid.sweep.attractors.runs import CODE, COLUMNS, NONE, OWNER, POINTS, runs_of
+from hybrid.sweep.attractors.search import FIRST_POINTS, known_of
 from hybrid.sweep.attractors.setup import Setup, digest, setup_of
 from hybrid.sweep.attractors.starts import Grid, axes_of, grid_of
+from hybrid.sweep.attractors.stretches import features_in, measured, untouched
 from hybrid.sweep.local import cores
 from hybrid.sweep.sheet import flags
 from hybrid.sweep.sweep import sweep
@@ -40,6 +42,8 @@ RESERVED = (
     *("label", "steps", "status", "message", "attractor", "exponent", "point", "state", "kind", "round"),
     *("period", "jumps", "exponents", "standard_error", "points", "mode_of_point", "fraction", "unit"),
 )
+# Names of results that searches by features have besides.
+OF_FEATURES = ("feature", "features", "lowest_feature", "highest_feature", "features_of_start")
 VIOLATES = -1
 
 
@@ -56,6 +60,8 @@ def basins(
     periods: int = 1000,
     recurrences: int = 10,
     tolerance: float = 0.01,
+    features: Any = None,
+    together: float | Mapping[str, float] | None = None,
     solver: Solver | None = None,
     store: str | PathLike[str] | None = None,
     executor: Any = None,
@@ -69,8 +75,10 @@ def basins(
 
     Parameters
     ----------
-    system, mode, parameters, t0, section, interval, periods, recurrences, tolerance, solver
+    system, mode, parameters, t0, section, interval, periods, recurrences, tolerance, features, together
         As for :func:`hybrid.attractors`.
+    solver
+        As for :func:`hybrid.simulate`.
     over
         For each component of the state a number, which all starts have; an array of values; or a range
         ``(low, high)``, of which 100 values are taken. Each array or range is an axis of the grid. Held
@@ -87,7 +95,8 @@ def basins(
         the mode that the call or the system names: it lies beyond a guard of each. The attribute
         ``violated_modes`` names these. ``steps`` is the number of points until the decision. With the
         attractors over the axis ``attractor``, as ``Attractors.to_xarray`` gives them, and their share of the
-        grid, ``fraction``; after Ctrl-C, of the lines that are complete.
+        grid, ``fraction``; after Ctrl-C, of the lines that are complete. With features also those of each
+        start, ``features_of_start``, over the axes of the grid and the axis ``feature``.
 
     Raises
     ------
@@ -105,7 +114,7 @@ def basins(
     """
     load_xarray()
 
-    axes = axes_of(system, over, RESERVED)
+    axes = axes_of(system, over, RESERVED if features is None else (*RESERVED, *OF_FEATURES))
     shown = as_flag(progress)
     grid = grid_of(system, axes)
     grid = attrs.evolve(grid, origins=with_age(system, grid.origins))
@@ -118,18 +127,22 @@ def basins(
         "periods": periods,
         "recurrences": recurrences,
         "tolerance": tolerance,
+        "features": features,
+        "together": together,
         "solver": solver,
     }
     setup = setup_of(system, grid.origins[np.lexsort(grid.origins.T[::-1])[0]], given)
     threads = executor if isinstance(executor, int) and not isinstance(executor, bool) else None
-    search = Search(setup, max(1, threads or cores()))
+    search = search_of(setup, max(1, threads or cores()))
     with CTRL_C:
         search.pilot(grid.origins)
-        rows = _not_run(grid)
+        lines = Lines(setup, grid, tuple(search.found))
+        rows = lines.not_run()
         if not CTRL_C.is_set():
-            rows = _rows(setup, grid, list(search.found), store=store, executor=executor, progress=shown)
+            rows = _rows(lines, store=store, executor=executor, progress=shown)
         if not CTRL_C.is_set():
             rows = search.decided(grid.origins, found=rows)
+        rows = search.judged(grid.origins, rows)
         stopped = CTRL_C.is_set()
     status = (
         interrupted_status("the lines that were complete")
@@ -139,22 +152,17 @@ def basins(
     return _dataset(setup, grid, search, rows, status)
 
 
-def _not_run(grid: Grid) -> np.ndarray:
-    rows = np.zeros((len(grid.origins), 4), dtype=np.int64)
-    rows[:, OWNER], rows[:, CODE] = NONE, StatusCode.NOT_RUN
-    return rows
-
-
-def _rows(setup: Setup, grid: Grid, found: list[Found], **options: Any) -> np.ndarray:
+def _rows(lines: Lines, **options: Any) -> np.ndarray:
     """What is found of each start with the attractors known so far, by a sweep over lines of the grid."""
+    grid = lines.grid
     if not grid.axes:
-        return Lines(setup, grid, tuple(found)).rows(grid.origins)
+        return lines.rows(grid.origins)
     first = grid.axes[0]
     # The values of an axis may occur twice, and need not be in order.
-    swept = sweep(Lines(setup, grid, tuple(found)), {first.name: first.points()}, **options)
-    rows = _not_run(grid)
+    swept = sweep(lines, {first.name: first.points()}, **options)
+    rows = lines.not_run()
     if "rows" in swept:
-        made = swept["rows"].values.reshape(-1, 4)
+        made = swept["rows"].values.reshape(rows.shape)
         done = np.isfinite(made[:, 0])
         rows[done] = made[done]
     failed = np.flatnonzero(swept.status.values == StatusCode.FAILED)
@@ -165,11 +173,22 @@ def _rows(setup: Setup, grid: Grid, found: list[Found], **options: Any) -> np.nd
 
 @attrs.frozen(eq=False)
 class Lines:
-    """The task of a sweep: the starts of a grid that have one value along its first axis."""
+    """The task of a sweep: the starts of a grid that have one value along its first axis.
+
+    They are decided by the attractors ``found`` so far, or their features are taken.
+    """
 
     setup: Setup
     grid: Grid
     found: tuple[Found, ...]
+
+    def not_run(self) -> np.ndarray:
+        """Rows of starts that have not been run."""
+        if self.setup.features is not None:
+            return untouched(len(self.grid.origins), self.setup.features)
+        rows = np.zeros((len(self.grid.origins), COLUMNS), dtype=np.int64)
+        rows[:, OWNER], rows[:, CODE] = NONE, StatusCode.NOT_RUN
+        return rows
 
     def __call__(self, point: Mapping[str, float]) -> dict[str, np.ndarray]:
         """What is found of each start of the line."""
@@ -191,6 +210,8 @@ class Lines:
 
     def rows(self, origins: np.ndarray) -> np.ndarray:
         """What is found of starts."""
+        if self.setup.features is not None:
+            return measured(self.setup, self.setup.features, origins)
         most = min(FIRST_POINTS, self.setup.periods) if self.found else 0
         return runs_of(self.setup).settle(origins, known_of(self.setup, list(self.found)), most)
 
@@ -214,8 +235,10 @@ class Lines:
         return {**self.setup.facts(), "starts": digest(others), "attractors": found}
 
 
-def _dataset(setup: Setup, grid: Grid, search: Search, rows: np.ndarray, status: Status) -> xarray.Dataset:
+def _dataset(setup: Setup, grid: Grid, search: Any, rows: np.ndarray, status: Status) -> xarray.Dataset:
     system, shape, dims = setup.system, grid.shape, grid.dims
+    features = features_in(rows)[0]
+    rows = rows[:, :COLUMNS].astype(np.int64)
     found, labels = search.ordered()
     label = np.where(rows[:, OWNER] >= 0, labels[rows[:, OWNER]], 0)
     label[rows[:, CODE] == codes.REFUSED] = VIOLATES
@@ -229,6 +252,9 @@ def _dataset(setup: Setup, grid: Grid, search: Search, rows: np.ndarray, status:
     told = {"0": "no attractor", "-1": f"violates {', '.join(violated)}"}
     made["label"] = (dims, label.reshape(shape), {f"meaning of {key}": text for key, text in told.items()})
     made["steps"] = (dims, rows[:, POINTS].reshape(shape))
+    if setup.features is not None:
+        made = made.assign_coords(feature=[*setup.features.names])
+        made["features_of_start"] = ((*dims, "feature"), features.reshape(*shape, -1))
     made["status"] = (dims, code.reshape(shape).astype(np.int16), flags())
     run = rows[:, CODE] != StatusCode.NOT_RUN
     shares = [float(np.sum(label == i)) / max(1, int(run.sum())) for i in range(1, len(found) + 1)]

@@ -67,26 +67,27 @@ class Found:
 def find(setup: Setup, x0: np.ndarray, mode: str | None) -> Found | None:
     """The attractor that the run from a start settles on; None if the run ends."""
     points = Points(setup, x0, mode)
-    before, _ = _collected(points, setup.periods)
+    before, _ = collected(points, setup.periods)
     if points.code != codes.DONE:
         return None
     turns = setup.turns
-    extent, share = _extent(np.vstack([x0, before]), turns), math.sqrt(setup.solver.rtol)
+    extent, share = extent_of(np.vstack([x0, before]), turns), math.sqrt(setup.solver.rtol)
     sample = np.empty((0, len(x0))), np.empty((0, 2), dtype=np.int64)
     # Chaos may be a long transient of a periodic orbit, so it takes many points to call an attractor chaotic.
     while len(sample[0]) < MOST_POINTS:
-        window = _collected(points, WINDOW)
+        window = collected(points, WINDOW)
         if points.code != codes.DONE:
             return None
-        extent = np.maximum(extent, _extent(window[0], turns))
-        count = _round(*window, extent, share, turns)
+        extent = np.maximum(extent, extent_of(window[0], turns))
+        count = round_of(*window, extent, share, turns)
         if count:
             return _periodic(setup, points, count, extent, x0)
         sample = np.vstack([sample[0], window[0]]), np.vstack([sample[1], window[1]])
     return _wandering(setup, points, *sample, extent, x0)
 
 
-def _collected(points: Points, count: int) -> tuple[np.ndarray, np.ndarray]:
+def collected(points: Points, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The next points of a run with angles within the first turn, and their modes and jumps."""
     states, places = points.more(count)
     states = within_turns(states, points.runs.setup.turns)
     if points.code != codes.DONE:
@@ -106,7 +107,7 @@ def within_turns(states: np.ndarray, turns: np.ndarray) -> np.ndarray:
     return np.where(angles, np.where(reduced < whole, reduced, 0.0), states)
 
 
-def _extent(states: np.ndarray, turns: np.ndarray) -> np.ndarray:
+def extent_of(states: np.ndarray, turns: np.ndarray) -> np.ndarray:
     """Size of what a run visits ``(n,)``; that of the state itself where a component never changes.
 
     The size of an angle is its turn.
@@ -115,7 +116,7 @@ def _extent(states: np.ndarray, turns: np.ndarray) -> np.ndarray:
     return np.where(turns > 0, turns, np.where(extent > 0, extent, np.where(size > 0, size, 1.0)))
 
 
-def _round(
+def round_of(
     states: np.ndarray, places: np.ndarray, extent: np.ndarray, share: float, turns: np.ndarray
 ) -> int:
     """The smallest number of points after which a whole round repeats, up to a share of the extent; or 0."""
@@ -135,7 +136,7 @@ def _periodic(setup: Setup, points: Points, count: int, extent: np.ndarray, x0: 
     """A stable periodic orbit of ``count`` points, or equilibrium, at which the run has arrived; or None."""
     run = points.trajectory
     origin, mode, begin, jumps, steps = run.x, run.mode, run.t, run.jumps, run.steps
-    states, places = _collected(points, count)
+    states, places = collected(points, count)
     if points.code != codes.DONE:
         return None
     period = count * setup.interval if setup.forced else run.t - begin
@@ -193,7 +194,7 @@ def _wandering(
     """An attractor without a period: a sample of its points, dense enough to be met again."""
     run = points.trajectory
     origin, mode, begin, jumps = run.x, run.mode, run.t, run.jumps
-    more, more_places = _collected(points, WINDOW)
+    more, more_places = collected(points, WINDOW)
     if points.code != codes.DONE:
         return None
     # Time and jumps per point.
@@ -226,7 +227,7 @@ def _closed(setup: Setup, attractor: Attractor, x: np.ndarray, mode: str) -> Att
     Points at equal times do not come back. The plane lies through a point, across the speed there.
     """
     turns = setup.turns
-    extent = np.maximum(_extent(attractor.points, turns), np.finfo(float).tiny)
+    extent = np.maximum(extent_of(attractor.points, turns), np.finfo(float).tiny)
     normal = (setup.begin(x, mode).field() / extent / extent).tolist()
     place = list(enumerate(zip(normal, x.tolist(), turns.tolist(), strict=True)))
 
@@ -238,9 +239,9 @@ def _closed(setup: Setup, attractor: Attractor, x: np.ndarray, mode: str) -> Att
     marked = with_section(setup.system, plane)
     crossed = attrs.evolve(setup, section=plane, marked=marked)
     points = Points(crossed, x, mode)
-    states, places = _collected(points, WINDOW)
+    states, places = collected(points, WINDOW)
     share = math.sqrt(setup.solver.rtol)
-    count = _round(states, places, extent, share, turns) if len(states) == WINDOW else 0
+    count = round_of(states, places, extent, share, turns) if len(states) == WINDOW else 0
     found = _periodic(crossed, points, count, extent, attractor.start) if count else None
     if found is None:
         return attractor

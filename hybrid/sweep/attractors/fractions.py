@@ -18,10 +18,11 @@ from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
+from hybrid.sweep.attractors.attractor import Attractor
 from hybrid.sweep.attractors.attractors import as_flag, status_of_search
+from hybrid.sweep.attractors.featured import search_of
 from hybrid.sweep.attractors.follow import followed
 from hybrid.sweep.attractors.runs import CODE, OWNER
-from hybrid.sweep.attractors.search import Search
 from hybrid.sweep.attractors.setup import Setup, digest, setup_of
 from hybrid.sweep.attractors.starts import axes_of, sample_of
 from hybrid.sweep.attractors.text import read, written
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
 
 # Points of an attractor in the dataset, at most.
 SHOWN = 128
+# What is kept of the features of an attractor.
+FEATURES = "features", "lowest_feature", "highest_feature"
 # Random starts that are decided together: an interrupt loses those of one batch.
 BATCH = 512
 WANTED = 'be None, or map one parameter to its values, as {"w": np.linspace(0.8, 1.2, 41)}'
@@ -57,6 +60,8 @@ def basin_fractions(
     periods: int = 1000,
     recurrences: int = 10,
     tolerance: float = 0.01,
+    features: Any = None,
+    together: float | Mapping[str, float] | None = None,
     solver: Solver | None = None,
     store: str | PathLike[str] | None = None,
     executor: Any = None,
@@ -75,8 +80,10 @@ def basin_fractions(
 
     Parameters
     ----------
-    system, mode, parameters, t0, section, interval, periods, recurrences, tolerance, solver
+    system, mode, parameters, t0, section, interval, periods, recurrences, tolerance, features, together
         As for :func:`hybrid.attractors`.
+    solver
+        As for :func:`hybrid.simulate`.
     over
         For each component of the state a number, a range ``(low, high)``, or an array of values to draw from.
         Held components and counters may be left out: they are 0 then.
@@ -92,7 +99,8 @@ def basin_fractions(
     xarray.Dataset
         Over the axis ``label`` (-1: violates every mode, 0: no attractor, 1, 2, ...): ``fraction`` and its
         ``standard_error``, ``kind``, ``round``, ``period`` and ``jumps`` of the attractors, and up to 128 of
-        their ``points`` with the modes there, as in :class:`hybrid.Attractor`. With ``along`` also over the
+        their ``points`` with the modes there, as in :class:`hybrid.Attractor`; with
+        features also these, over the axis ``feature``. With ``along`` also over the
         axis of the parameter: there the labels count attractors in the order in which they appear; ``first``
         and ``last`` are the values between which each of them lives. :func:`hybrid.continue_all` compares
         such a dataset with branches.
@@ -125,6 +133,8 @@ def basin_fractions(
         "periods": periods,
         "recurrences": recurrences,
         "tolerance": tolerance,
+        "features": features,
+        "together": together,
         "solver": solver,
     }
     first = origins[np.lexsort(origins.T[::-1])[0]]
@@ -189,25 +199,26 @@ class FractionsAt:
         """Attractors with their shares as text, and a status."""
         search = self.search(point)
         search.pilot(self.origins)
-        rows = np.zeros((0, 4), dtype=np.int64)
+        rows = search.decided(self.origins[:0])
         for begin in range(0, len(self.origins), BATCH):
             batch = search.decided(self.origins[begin : begin + BATCH])
             # A batch that was interrupted holds the starts that are decided soon: it is no fair sample.
             if CTRL_C.is_set():
                 break
             rows = np.vstack([rows, batch])
+        rows = search.judged(self.origins[: len(rows)], rows)
         counts = [int(np.sum(rows[:, OWNER] == i)) for i in range(len(search.found))]
         beyond = int(np.sum(rows[:, CODE] == codes.REFUSED))
         text = written(search, counts, beyond, len(rows))
         return {"found": text, "status": status_of_search(search.setup, self.origins, rows)}
 
-    def search(self, point: Mapping[str, float]) -> Search:
+    def search(self, point: Mapping[str, float]) -> Any:
         """A search at a value of the parameter."""
         setup = attrs.evolve(self.setup, parameters={**self.setup.parameters, **point})
         if setup.forced:
             period = setup.system.forcing_period(setup.parameters)
             setup = attrs.evolve(setup, interval=float(period or setup.interval))
-        return Search(setup, 1)
+        return search_of(setup, 1)
 
     @property
     def system(self) -> HybridSystem:
@@ -228,13 +239,24 @@ def _dataset(
 
     most = max((max(each["labels"], default=0) for each in found if each is not None), default=0)
     labels = np.arange(-1, most + 1)
-    columns = {**_shares(found, labels), **_attractors(found, labels, setup.system.dimension)}
+    asked = () if setup.features is None else setup.features.names
+    columns = {
+        **_shares(found, labels),
+        **_attractors(found, labels, setup.system.dimension),
+        **_features(found, labels, len(asked)),
+    }
     names = Names(setup.system.state_names, dict(setup.system.units))
     used = {**setup.system.parameters, **setup.parameters}
     made_by = {**attributes("fractions", status, setup.system, used), "t0": setup.t0}
-    inner = {"points": ("point", "state"), "mode_of_point": ("point",)}
+    inner = {
+        "points": ("point", "state"),
+        "mode_of_point": ("point",),
+        **dict.fromkeys(FEATURES, ("feature",)),
+    }
     units = {"period": names.of("t"), "points": names.states}
     coords: dict[str, Any] = {"label": labels, **names.coords()}
+    if asked:
+        coords["feature"] = [*asked]
     if name is None:
         return xarray.Dataset(
             {key: (("label", *inner.get(key, ())), each[0], units.get(key)) for key, each in columns.items()},
@@ -264,16 +286,33 @@ def _shares(found: list[dict[str, Any] | None], labels: np.ndarray) -> dict[str,
     return {"fraction": fraction, "standard_error": error}
 
 
-def _attractors(
-    found: list[dict[str, Any] | None], labels: np.ndarray, dimension: int
-) -> dict[str, np.ndarray]:
-    """What is known of the attractors ``(N, labels)``, and some of their points, filled up with nan."""
-    there = [
+def _known(found: list[dict[str, Any] | None]) -> list[tuple[int, int, Attractor]]:
+    """The attractors, each with its place among the values and among the labels."""
+    return [
         (i, label + 1, one.attractor)
         for i, each in enumerate(found)
         if each is not None
         for label, one in zip(each["labels"], each["found"], strict=True)
     ]
+
+
+def _features(found: list[dict[str, Any] | None], labels: np.ndarray, count: int) -> dict[str, np.ndarray]:
+    """Features of the attractors ``(N, labels, count)`` and their ranges; nothing if none are asked for."""
+    if not count:
+        return {}
+    made = {name: np.full((len(found), len(labels), count), np.nan) for name in FEATURES}
+    for i, j, attractor in _known(found):
+        values = [*attractor.features.values()], *np.transpose([*attractor.ranges.values()])
+        for name, each in zip(FEATURES, values, strict=True):
+            made[name][i, j] = each
+    return made
+
+
+def _attractors(
+    found: list[dict[str, Any] | None], labels: np.ndarray, dimension: int
+) -> dict[str, np.ndarray]:
+    """What is known of the attractors ``(N, labels)``, and some of their points, filled up with nan."""
+    there = _known(found)
     shape, most = (len(found), len(labels)), max((len(each.points[:SHOWN]) for *_, each in there), default=0)
     made: dict[str, np.ndarray] = {
         "kind": np.full(shape, "", dtype=object),

@@ -27,6 +27,7 @@ from hybrid.system.graph import starting_mode
 
 # Columns of what is found of each start: attractor (-1 for none), points until decided, code, mode at start.
 OWNER, POINTS, CODE, MODE = range(4)
+COLUMNS = 4
 NONE = -1
 
 
@@ -57,7 +58,7 @@ class Runs:
         self, origins: np.ndarray, known: Any, most: int, threads: int = 1, bar: Progress | None = None
     ) -> np.ndarray:
         """What is found of each start: rows ``(N, 4)``; the code is NOT_RUN after an interrupt."""
-        found = np.zeros((len(origins), 4), dtype=np.int64)
+        found = np.zeros((len(origins), COLUMNS), dtype=np.int64)
         found[:, OWNER], found[:, CODE] = NONE, StatusCode.NOT_RUN
 
         def run(block: range) -> None:

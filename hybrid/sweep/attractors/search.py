@@ -83,6 +83,23 @@ class Search:
                     limit, vain = min(2 * limit, most), 0
         return found
 
+    def judged(self, origins: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """The rows with the attractor of each start: they have it."""
+        return rows
+
+    def led_to(self, x0: np.ndarray) -> int:
+        """Index of the attractor to which a start leads, which may be new; -1 for none."""
+        runs = runs_of(self.setup)
+        row = runs.settle(x0[None], self.known(), self.setup.periods)[0]
+        if row[OWNER] < 0 and self.explore(x0, int(row[MODE])):
+            row = runs.settle(x0[None], self.known(), self.setup.periods)[0]
+        return int(row[OWNER])
+
+    def distance(self, one: Found, other: Found) -> float:
+        """Mean distance of the points of an attractor from those of another, in units of its radius."""
+        tree = one.tree(other.attractor.points)
+        return float(np.mean(tree.query(one.in_radii(one.attractor.points))[0]))
+
     def explore(self, x0: np.ndarray, mode: int) -> bool:
         """Whether the run from a start adds to what is known of the attractors."""
         setup = self.setup

@@ -19,6 +19,7 @@ from hybrid.simulation.periods import check_time
 from hybrid.simulation.plan import check_solver
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
+from hybrid.sweep.attractors.features import Features, checked_features
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, as_system, check_mode
 from hybrid.transform.aged import aged, original_of
@@ -44,6 +45,8 @@ class Setup:
         Points in succession near one attractor that decide a start.
     tolerance
         How near that is, as a share of the extent of the attractor's orbit.
+    features
+        What tells attractors apart in place of their points, if anything does.
     """
 
     system: HybridSystem
@@ -57,6 +60,7 @@ class Setup:
     periods: int
     recurrences: int
     tolerance: float
+    features: Features | None = None
 
     @property
     def markers(self) -> int:
@@ -97,9 +101,11 @@ class Setup:
     def facts(self) -> dict[str, Any]:
         """What decides the results, by name."""
         own = ("mode", "t0", "solver", "section", "interval", "periods", "recurrences", "tolerance")
+        asked = {} if self.features is None else {"features": self.features}
         return {
             "model": original_of(self.system),
             **{name: getattr(self, name) for name in own},
+            **asked,
             **{f"parameter_{name}": value for name, value in self.parameters.items()},
         }
 
@@ -143,6 +149,7 @@ def setup_of(system: HybridSystem, first: np.ndarray, given: Mapping[str, Any]) 
         periods=arguments.count("periods", given["periods"], 1),
         recurrences=arguments.count("recurrences", given["recurrences"], 1),
         tolerance=arguments.positive("tolerance", given["tolerance"], "be a share below 1"),
+        features=checked_features(given.get("features"), given.get("together")),
     )
     known = math.sqrt(found.solver.rtol)
     if not known < found.tolerance < 1.0:

@@ -9,11 +9,11 @@ import attrs
 import numpy as np
 
 from hybrid.sweep.attractors.attractor import Attractor
+from hybrid.sweep.attractors.featured import Group
 from hybrid.sweep.attractors.find import Found
-from hybrid.sweep.attractors.search import Search
 
 
-def written(search: Search, counts: list[int], beyond: int, starts: int) -> str:
+def written(search: Any, counts: list[int], beyond: int, starts: int) -> str:
     """What was found at one value as text; the order of attractors is that of their labels."""
     _, labels = search.ordered()
     order = sorted(range(len(search.found)), key=lambda i: int(labels[i]))
@@ -27,25 +27,23 @@ def written(search: Search, counts: list[int], beyond: int, starts: int) -> str:
     )
 
 
-def _as_json(found: Found) -> dict[str, Any]:
-    fields = attrs.asdict(found.attractor)
-    return {
-        "radius": found.radius.tolist(),
-        "turns": found.turns.tolist(),
-        **{
-            name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in fields.items()
-        },
-    }
+def _as_json(found: Found | Group) -> dict[str, Any]:
+    own = {field.name: getattr(found, field.name) for field in attrs.fields(type(found))}
+    own |= attrs.asdict(own.pop("attractor"))
+    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in own.items()}
 
 
 def read(text: str) -> dict[str, Any]:
     """What was found at one value, with the attractors as objects."""
     given = json.loads(text)
-    found = []
-    for each in given["found"]:
-        radius, turns = (np.array(each.pop(name)) for name in ("radius", "turns"))
-        arrays: dict[str, Any] = {
-            name: np.array(value) if isinstance(value, list) else value for name, value in each.items()
-        }
-        found.append(Found(Attractor(**arrays), radius, turns))
-    return {**given, "found": found}
+    return {**given, "found": [_object_of(each) for each in given["found"]]}
+
+
+def _object_of(given: dict[str, Any]) -> Found | Group:
+    values: dict[str, Any] = {
+        name: np.array(each) if isinstance(each, list) else each for name, each in given.items()
+    }
+    kind: type[Any] = Group if "scatter" in given else Found
+    own = {field.name: values.pop(field.name, None) for field in attrs.fields(kind)}
+    made: Found | Group = kind(**(own | {"attractor": Attractor(**values)}))
+    return made

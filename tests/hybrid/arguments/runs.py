@@ -51,6 +51,9 @@ def searches():
         "periods": [0, *COUNT],
         "recurrences": [0, *COUNT],
         "tolerance": POSITIVE,
+        "features": ["a", 3, True, [], {}, {3: len}, {"": len}, {"a": 3}, [len, len], [3], Odd()],
+        # A distance takes features.
+        "together": [*OPTIONAL_POSITIVE, 1.0, {"a": 1.0}],
         "progress": FLAG[1:],
     }
     drawn = {"starts": [0, *COUNT], "seed": COUNT}

@@ -8,6 +8,7 @@ from matplotlib.collections import PathCollection
 import hybrid
 import hybrid.plot
 import models
+from hybrid.measures import mean
 from tests.hybrid.sweep.attractors.test_attractors import double_well
 
 
@@ -59,3 +60,15 @@ def test_shares_as_bars_and_as_bands():
     assert legend(bands) == ["1: equilibrium", "2: equilibrium"]
     one = hybrid.plot(over.isel(h=[1]))
     assert sum(bar.get_height() for bar in one.patches) == pytest.approx(1.0)
+
+
+def test_attractors_by_features_are_told_by_them():
+    given = {"features": {"level": mean("x")}}
+    ax = hybrid.plot(hybrid.basins(double_well(), {"x": np.linspace(-2.0, 2.0, 10)}, **given))
+    assert legend(ax) == ["1: level -1 (50.0% of the starts)", "2: level 1 (50.0% of the starts)"]
+    bars = hybrid.plot(hybrid.basin_fractions(double_well(), {"x": (-1.0, 3.0)}, starts=10, **given))
+    assert legend(bars) == ["1: level -1", "2: level 1"]
+    over = hybrid.basin_fractions(
+        double_well(), {"x": (-2.0, 2.0)}, along={"h": [-0.2, 0.2]}, starts=10, **given
+    )
+    assert legend(hybrid.plot(over)) == ["1: level -1.088 to -0.8789", "2: level 0.8789 to 1.088"]

@@ -74,14 +74,6 @@ class Pressed:
         monkeypatch.setattr(CtrlC, "is_set", is_set)
 
 
-@pytest.fixture
-def python_hears_interrupts():
-    """A process that runs tests for another one may ignore them."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.6, 0.9])
 def test_shares_after_ctrl_c_are_those_of_the_starts_that_were_decided(
     monkeypatch, python_hears_interrupts, share
