@@ -47,6 +47,8 @@ from hybrid.sweep.attractors.boundaries import (
     basin_entropy,
     uncertainty_exponent,
 )
+from hybrid.sweep.attractors.edge import EdgeState
+from hybrid.sweep.attractors.edge_state import edge_state
 from hybrid.sweep.attractors.fractions import basin_fractions
 from hybrid.sweep.many import simulate_many
 from hybrid.sweep.store import open_store
@@ -80,6 +82,7 @@ __all__ = [
     "CompiledSystem",
     "Delay",
     "Diagram",
+    "EdgeState",
     "Equilibrium",
     "EquilibriumBifurcation",
     "EquilibriumBranch",
@@ -118,6 +121,7 @@ __all__ = [
     "continue_bifurcation",
     "continue_equilibrium",
     "continue_orbit",
+    "edge_state",
     "equilibrium",
     "filippov",
     "from_equations",

@@ -124,6 +124,10 @@ DEFAULTS = {
     },
     hybrid.attractors: {**SEARCH, **SAMPLE, "starts": 500, "executor": None},
     hybrid.basins: {**SEARCH, "store": None, "executor": None},
+    hybrid.edge_state: {
+        **{**LONG, "progress": None, "interval": None, "rounds": 100, "periods": 1000, "recurrences": 10},
+        "tolerance": 0.01,
+    },
     hybrid.basin_entropy: {"size": 5},
     hybrid.uncertainty_exponent: {"sizes": None},
     hybrid.basin_fractions: {

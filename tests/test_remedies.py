@@ -24,6 +24,7 @@ BALL = models.bouncing_ball()
         lambda **options: hybrid.attractors(BALL, {"q": 1.0, "v": 0.0}, **options),
         lambda **options: hybrid.basins(BALL, {"q": 1.0, "v": 0.0}, **options),
         lambda **options: hybrid.basin_fractions(BALL, {"q": 1.0, "v": 0.0}, **options),
+        lambda **options: hybrid.edge_state(BALL, (1.0, 0.0), (2.0, 0.0), **options),
         lambda **options: lyapunov.covariant_vectors(BALL, (1.0, 0.0), **options),
         lambda **options: lyapunov.finite_time_exponents(BALL, (1.0, 0.0), **options),
         lambda **options: lyapunov.two_orbit_exponents(BALL, (1.0, 0.0), **options),

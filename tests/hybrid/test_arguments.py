@@ -106,6 +106,7 @@ NOT_CALLED = {
     "EquilibriumCurve",
     "SpecialEquilibrium",
     "Diagram",
+    "EdgeState",
     "BasinEntropy",
     "UncertaintyExponent",
     "Section",

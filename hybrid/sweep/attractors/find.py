@@ -27,6 +27,8 @@ from hybrid.transform.markers import with_section
 WINDOW, MOST_POINTS = 1024, 16_384
 # Share of its points that an attractor visits again, near earlier ones, before a sample counts as complete.
 REVISITED = 0.9
+# Changes of a component at rest, in units of the solver's tolerances: a run may begin on its attractor.
+ERRORS = 100.0
 # Intervals from which exponents are averaged at first and at most, and those that show the size of the orbit.
 INTERVALS, MOST_INTERVALS, LOOKED_AT = 400, 1600, 16
 
@@ -71,14 +73,14 @@ def find(setup: Setup, x0: np.ndarray, mode: str | None) -> Found | None:
     if points.code != codes.DONE:
         return None
     turns = setup.turns
-    extent, share = extent_of(np.vstack([x0, before]), turns), math.sqrt(setup.solver.rtol)
+    extent, share = extent_of(np.vstack([x0, before]), setup), math.sqrt(setup.solver.rtol)
     sample = np.empty((0, len(x0))), np.empty((0, 2), dtype=np.int64)
     # Chaos may be a long transient of a periodic orbit, so it takes many points to call an attractor chaotic.
     while len(sample[0]) < MOST_POINTS:
         window = collected(points, WINDOW)
         if points.code != codes.DONE:
             return None
-        extent = np.maximum(extent, extent_of(window[0], turns))
+        extent = np.maximum(extent, np.ptp(window[0], axis=0))
         count = round_of(*window, extent, share, turns)
         if count:
             return _periodic(setup, points, count, extent, x0)
@@ -107,13 +109,17 @@ def within_turns(states: np.ndarray, turns: np.ndarray) -> np.ndarray:
     return np.where(angles, np.where(reduced < whole, reduced, 0.0), states)
 
 
-def extent_of(states: np.ndarray, turns: np.ndarray) -> np.ndarray:
-    """Size of what a run visits ``(n,)``; that of the state itself where a component never changes.
+def extent_of(states: np.ndarray, setup: Setup) -> np.ndarray:
+    """Size of what a run visits ``(n,)``; that of the state itself where a component does not change.
 
-    The size of an angle is its turn.
+    A change or a size below ``ERRORS`` times the solver's tolerances is an error of the run. The size of an
+    angle is its turn.
     """
     extent, size = np.ptp(states, axis=0), np.abs(states).max(axis=0)
-    return np.where(turns > 0, turns, np.where(extent > 0, extent, np.where(size > 0, size, 1.0)))
+    small = ERRORS * setup.solver.atol
+    changes, counts = extent > ERRORS * setup.solver.rtol * size + small, size > small
+    still = np.where(counts, size, 1.0)
+    return np.where(setup.turns > 0, setup.turns, np.where(changes, extent, still))
 
 
 def round_of(
@@ -227,7 +233,7 @@ def _closed(setup: Setup, attractor: Attractor, x: np.ndarray, mode: str) -> Att
     Points at equal times do not come back. The plane lies through a point, across the speed there.
     """
     turns = setup.turns
-    extent = np.maximum(extent_of(attractor.points, turns), np.finfo(float).tiny)
+    extent = np.maximum(extent_of(attractor.points, setup), np.finfo(float).tiny)
     normal = (setup.begin(x, mode).field() / extent / extent).tolist()
     place = list(enumerate(zip(normal, x.tolist(), turns.tolist(), strict=True)))
 

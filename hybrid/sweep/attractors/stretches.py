@@ -102,7 +102,7 @@ def settled(setup: Setup, x0: np.ndarray, mode: str) -> tuple[Points, int]:
     points = Points(setup, x0, mode)
     states, places = collected(points, setup.periods)
     window = states[-LOOKED_AT:], places[-LOOKED_AT:]
-    extent, share = extent_of(window[0], setup.turns), math.sqrt(setup.solver.rtol)
+    extent, share = extent_of(window[0], setup), math.sqrt(setup.solver.rtol)
     count = round_of(*window, extent, share, setup.turns) if points.code == codes.DONE else 0
     return points, -(-setup.recurrences // count) * count if count else setup.recurrences
 

@@ -58,7 +58,23 @@ def searches():
     }
     drawn = {"starts": [0, *COUNT], "seed": COUNT}
     stored = {"store": [3, True, 1.5, [1], Odd()], "executor": EXECUTOR}
+    shared = (
+        "system",
+        "mode",
+        "parameters",
+        "solver",
+        "t0",
+        "interval",
+        "periods",
+        "recurrences",
+        "tolerance",
+    )
+    tracked = {name: common[name] for name in (*shared, "progress")}
     return [
+        (
+            call(hybrid.edge_state, OSCILLATOR, (0.0, 0.0), (0.1, 0.0)),
+            {**tracked, "one": STATE, "other": STATE, "rounds": [0, *COUNT]},
+        ),
         (
             call(hybrid.attractors, OSCILLATOR, over, starts=3),
             {**common, **drawn, "executor": EXECUTOR[:-2]},
