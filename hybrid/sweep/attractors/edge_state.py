@@ -21,6 +21,7 @@ from hybrid.status import Status, StatusCode
 from hybrid.sweep.attractors.attractor import Attractor, unaged
 from hybrid.sweep.attractors.attractors import as_flag
 from hybrid.sweep.attractors.closing import BACK, closed
+from hybrid.sweep.attractors.destinations import ENDS, Begin, Destinations
 from hybrid.sweep.attractors.edge import (
     EQUILIBRIUM,
     NO_EDGE,
@@ -30,8 +31,7 @@ from hybrid.sweep.attractors.edge import (
     EdgeState,
 )
 from hybrid.sweep.attractors.setup import setup_of
-from hybrid.sweep.attractors.sides import ENDS, Sides, Start
-from hybrid.sweep.attractors.tracking import Pair, Tracking
+from hybrid.sweep.attractors.tracking import Tracking, TwoStarts
 from hybrid.system.graph import HybridSystem, as_system, check_mode
 from hybrid.system.growth import growing
 from hybrid.transform.aged import original_of, with_age, without_age
@@ -134,35 +134,35 @@ def edge_state(
         "solver": solver,
     }
     setup = setup_of(system, starts[0].x, given)
-    sides = Sides(setup)
+    destinations = Destinations(setup)
     with CTRL_C:
         for each in (one, other):
             if isinstance(each, Attractor):
                 # The run that the attractor was found by tells more of it than one that begins there.
-                sides.of(Start(_state(system, each.start), mode))
-        found = [sides.of(each) for each in starts]
+                destinations.of(Begin(_state(system, each.start), mode))
+        found = [destinations.of(each) for each in starts]
         if found[0] == found[1] or max(found) < 0:
-            return _no_edge(sides, starts, found)
+            return _no_edge(destinations, starts, found)
         # The near side has an attractor.
         exchanged = found[0] < 0
         first, second = starts[::-1] if exchanged else starts
         near, far = found[::-1] if exchanged else found
         common = first.mode if first.mode == second.mode else None
-        tracking = Tracking(sides, near, far, Pair(first.x, second.x, common))
+        tracking = Tracking(destinations, near, far, TwoStarts(first.x, second.x, common))
         with progress_bar(rounds, "Edge state", shown, "round") as bar:
             done, saddle = _tracked(tracking, rounds, bar)
         return _result(tracking, saddle, done, exchanged=exchanged)
 
 
-def _start(system: HybridSystem, name: str, given: Any, mode: str | None) -> Start:
+def _start(system: HybridSystem, name: str, given: Any, mode: str | None) -> Begin:
     if mode is not None:
         check_mode(system, mode)
     if not isinstance(given, Attractor):
-        return Start(_state(system, system.variables.state_values(name, given)), mode)
+        return Begin(_state(system, system.variables.state_values(name, given)), mode)
     if not len(given.points):
         raise arguments.refusal(name, "be an attractor with points", given)
     own = arguments.known(f"{name}: Mode", str(given.mode[0]), system.mode_names, "Modes")
-    return Start(_state(system, given.points[0]), own if mode is None else mode)
+    return Begin(_state(system, given.points[0]), own if mode is None else mode)
 
 
 def _state(system: HybridSystem, x: np.ndarray) -> np.ndarray:
@@ -181,7 +181,7 @@ def _tracked(tracking: Tracking, rounds: int, bar: Progress) -> tuple[int, Saddl
     return rounds, None
 
 
-def _no_edge(sides: Sides, starts: list[Start], found: list[int]) -> EdgeState:
+def _no_edge(destinations: Destinations, starts: list[Begin], found: list[int]) -> EdgeState:
     """The result for two starts that lead to one attractor, or to none."""
     told = "Both starts lead to the same attractor"
     if found[0] < 0:
@@ -194,7 +194,7 @@ def _no_edge(sides: Sides, starts: list[Start], found: list[int]) -> EdgeState:
     if CTRL_C.is_set():
         status = interrupted_status("the starts")
     bracket = np.array([each.x for each in starts])
-    return _edge(sides, NO_EDGE, Start(bracket[0], starts[0].mode), bracket, found, status)
+    return _edge(destinations, NO_EDGE, Begin(bracket[0], starts[0].mode), bracket, found, status)
 
 
 def _result(tracking: Tracking, saddle: Saddle | None, done: int, *, exchanged: bool) -> EdgeState:
@@ -203,8 +203,8 @@ def _result(tracking: Tracking, saddle: Saddle | None, done: int, *, exchanged: 
     bracket, found = np.array([pair.one, pair.other]), [tracking.near, tracking.far]
     if exchanged:
         bracket, found = bracket[::-1], found[::-1]
-    at = Start(tracking.middle(pair.one, pair.other), pair.mode)
-    made = _edge(tracking.sides, kind, at, bracket, found, _status(tracking, kind, saddle, done))
+    at = Begin(tracking.middle(pair.one, pair.other), pair.mode)
+    made = _edge(tracking.destinations, kind, at, bracket, found, _status(tracking, kind, saddle, done))
     made = attrs.evolve(
         made,
         points=without_age(made.system, tracking.points),
@@ -220,15 +220,15 @@ def _result(tracking: Tracking, saddle: Saddle | None, done: int, *, exchanged: 
 
 
 def _edge(
-    sides: Sides, kind: str, at: Start, bracket: np.ndarray, found: list[int], status: Status
+    destinations: Destinations, kind: str, at: Begin, bracket: np.ndarray, found: list[int], status: Status
 ) -> EdgeState:
     """A result without a trajectory."""
-    setup = sides.setup
+    setup = destinations.setup
     system = original_of(setup.system)
     leads: list[Attractor | None] = [None, None]
     for i, each in enumerate(found):
         if each >= 0:
-            [leads[i]] = unaged((sides.found[each].attractor,), setup.system)[0]
+            [leads[i]] = unaged((destinations.found[each].attractor,), setup.system)[0]
     return EdgeState(
         system=system,
         parameters={**system.parameters, **setup.parameters},

@@ -14,7 +14,7 @@ from hybrid.status import StatusCode
 from hybrid.sweep.attractors.attractor import BY_FEATURES, Attractor
 from hybrid.sweep.attractors.features import Features
 from hybrid.sweep.attractors.find import collected
-from hybrid.sweep.attractors.groups import Known, Linkage
+from hybrid.sweep.attractors.groups import Linkage, Precision
 from hybrid.sweep.attractors.runs import CODE, MODE, NONE, OWNER
 from hybrid.sweep.attractors.search import Search
 from hybrid.sweep.attractors.setup import Setup
@@ -22,7 +22,7 @@ from hybrid.sweep.attractors.stretches import STRETCHES, features_in, measured_i
 
 
 @attrs.frozen(eq=False)
-class Group:
+class Cluster:
     """An attractor with the scatter of its features ``(F,)``, by which another run is told to lead to it."""
 
     attractor: Attractor
@@ -42,8 +42,8 @@ class FeatureSearch:
 
     def __init__(self, setup: Setup, features: Features, threads: int) -> None:
         self.setup, self.features, self.threads = setup, features, threads
-        self.found: list[Group] = []
-        self.known = Known(math.sqrt(setup.solver.rtol), math.sqrt(setup.solver.atol))
+        self.found: list[Cluster] = []
+        self.known = Precision(math.sqrt(setup.solver.rtol), math.sqrt(setup.solver.atol))
 
     def pilot(self, origins: np.ndarray) -> None:
         """Nothing: no attractor needs to be known before the others."""
@@ -69,7 +69,7 @@ class FeatureSearch:
             middle = members[_middle(values[members], origins[members])]
             found = self._attractor(origins[middle], int(rows[middle, MODE]), values[middle], values[members])
             rows[members, OWNER] = len(self.found)
-            self.found.append(Group(found, np.sqrt(np.mean(changes[members] ** 2, axis=0))))
+            self.found.append(Cluster(found, np.sqrt(np.mean(changes[members] ** 2, axis=0))))
         return rows
 
     def led_to(self, x0: np.ndarray) -> int:
@@ -90,10 +90,10 @@ class FeatureSearch:
         if best == NONE:
             best = len(self.found)
             new = self._attractor(x0, int(rows[0, MODE]), values, values[None])
-            self.found.append(Group(new, changes))
+            self.found.append(Cluster(new, changes))
         return best
 
-    def distance(self, one: Group, other: Group) -> float:
+    def distance(self, one: Cluster, other: Cluster) -> float:
         """How far apart two attractors are, in the sizes of their features."""
         values = np.array([[*each.attractor.features.values()] for each in (one, other)])
         sizes = np.maximum(np.abs(values).max(axis=0), np.finfo(float).tiny)

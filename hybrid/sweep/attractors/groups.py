@@ -22,7 +22,7 @@ DIGITS = 5
 
 
 @attrs.frozen
-class Known:
+class Precision:
     """To what share of itself, and to what size, a feature is known."""
 
     share: float
@@ -56,7 +56,7 @@ class Linkage:
 
     values: np.ndarray
     scatter: np.ndarray
-    known: Known
+    known: Precision
     apart: np.ndarray | None
 
     def grouped(self) -> np.ndarray:

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from hybrid.sweep.attractors.attractor import Attractor
-from hybrid.sweep.attractors.featured import Group
+from hybrid.sweep.attractors.featured import Cluster
 from hybrid.sweep.attractors.find import Found
 
 
@@ -27,7 +27,7 @@ def written(search: Any, counts: list[int], beyond: int, starts: int) -> str:
     )
 
 
-def _as_json(found: Found | Group) -> dict[str, Any]:
+def _as_json(found: Found | Cluster) -> dict[str, Any]:
     own = {field.name: getattr(found, field.name) for field in attrs.fields(type(found))}
     own |= attrs.asdict(own.pop("attractor"))
     return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in own.items()}
@@ -39,11 +39,11 @@ def read(text: str) -> dict[str, Any]:
     return {**given, "found": [_object_of(each) for each in given["found"]]}
 
 
-def _object_of(given: dict[str, Any]) -> Found | Group:
+def _object_of(given: dict[str, Any]) -> Found | Cluster:
     values: dict[str, Any] = {
         name: np.array(each) if isinstance(each, list) else each for name, each in given.items()
     }
-    kind: type[Any] = Group if "scatter" in given else Found
+    kind: type[Any] = Cluster if "scatter" in given else Found
     own = {field.name: values.pop(field.name, None) for field in attrs.fields(kind)}
-    made: Found | Group = kind(**(own | {"attractor": Attractor(**values)}))
+    made: Found | Cluster = kind(**(own | {"attractor": Attractor(**values)}))
     return made

@@ -7,10 +7,10 @@ import numpy as np
 
 from hybrid.compiler.interrupts import CTRL_C
 from hybrid.kernels.types import codes
+from hybrid.sweep.attractors.destinations import UNDECIDED, Begin, Destinations
 from hybrid.sweep.attractors.find import collected, extent_of
 from hybrid.sweep.attractors.runs import Points
 from hybrid.sweep.attractors.setup import Setup
-from hybrid.sweep.attractors.sides import UNDECIDED, Sides, Start
 from hybrid.system.periodicity import closed_change
 
 # Widths of a pair of starts, as shares of the extent of what the runs visit: bisection ends at the first, and
@@ -21,7 +21,7 @@ CHUNK = 32
 
 
 @attrs.frozen(eq=False)
-class Pair:
+class TwoStarts:
     """Two starts in one mode, of which the first leads to the attractor ``near`` and the other does not."""
 
     one: np.ndarray
@@ -46,14 +46,14 @@ class Tracking:
         Everything that starts on the far side have led to.
     """
 
-    def __init__(self, sides: Sides, near: int, far: int, pair: Pair) -> None:
-        self.sides, self.near, self.far, self.pair = sides, near, far, pair
-        self.setup: Setup = sides.setup
+    def __init__(self, destinations: Destinations, near: int, far: int, pair: TwoStarts) -> None:
+        self.destinations, self.near, self.far, self.pair = destinations, near, far, pair
+        self.setup: Setup = destinations.setup
         self.moving = self.setup.system.tangent_dimension
         self.met = {far}
         self.points = np.empty((0, len(pair.one)))
         self.modes: list[str] = []
-        visited = [each.attractor.points for each in sides.found]
+        visited = [each.attractor.points for each in destinations.found]
         self.extent = extent_of(np.vstack([pair.one, pair.other, *visited]), self.setup)
         # Points for which the last pair stayed together, and whether that was none.
         self.together, self.lost = 0, False
@@ -76,7 +76,7 @@ class Tracking:
             middle = self.middle(pair.one, pair.other)
             if np.array_equal(middle, pair.one) or np.array_equal(middle, pair.other):
                 return
-            side = self.sides.of(Start(middle, pair.mode))
+            side = self.destinations.of(Begin(middle, pair.mode))
             if side == UNDECIDED or CTRL_C.is_set():
                 return
             if side == self.near:
@@ -120,5 +120,5 @@ class Tracking:
         shown = np.flatnonzero(same[: last + 1])
         self.points = np.vstack([self.points, self.middle(one[shown], other[shown])])
         self.modes += names[places[shown, 0]].tolist()
-        self.pair = Pair(one[last], other[last], str(names[places[last, 0]]))
+        self.pair = TwoStarts(one[last], other[last], str(names[places[last, 0]]))
         return True

@@ -69,7 +69,7 @@ def searches():
         "recurrences",
         "tolerance",
     )
-    tracked = {name: common[name] for name in (*shared, "progress")}
+    tracked = {name: common[name] for name in (*shared, "tolerance", "progress")}
     return [
         (
             call(hybrid.edge_state, OSCILLATOR, (0.0, 0.0), (0.1, 0.0)),

@@ -7,7 +7,7 @@ import hybrid
 import models
 from hybrid import HybridSystem, Mode, StatusCode
 from hybrid.measures import maximum, mean, minimum, rms
-from hybrid.sweep.attractors.groups import Known, Linkage
+from hybrid.sweep.attractors.groups import Linkage, Precision
 from tests.hybrid.sweep.attractors.test_attractors import double_well
 from tests.hybrid.sweep.attractors.test_fractions import Pressed
 from tests.lyapunov.clocked import clocked
@@ -28,7 +28,7 @@ def pendulum():
 def grouped(values, scatter=0.0, apart=None):
     values = np.array(values, dtype=float)
     values = values[:, None] if values.ndim == 1 else values
-    known = Known(1e-5, 1e-6)
+    known = Precision(1e-5, 1e-6)
     return Linkage(values, np.full(values.shape, scatter), known, apart).grouped().tolist()
 
 

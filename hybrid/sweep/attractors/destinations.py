@@ -17,14 +17,14 @@ ENDS, UNDECIDED = -1, -2
 
 
 @attrs.frozen(eq=False)
-class Start:
+class Begin:
     """A state with its mode; None if the guards are to choose the mode."""
 
     x: np.ndarray
     mode: str | None
 
 
-class Sides:
+class Destinations:
     """Tells to which attractor a start leads, with attractors found as they are needed."""
 
     def __init__(self, setup: Setup) -> None:
@@ -32,7 +32,7 @@ class Sides:
         self.found: list[Found] = []
         self._searches: dict[str | None, Search] = {}
 
-    def of(self, start: Start) -> int:
+    def of(self, start: Begin) -> int:
         """The index of the attractor to which a start leads, or ENDS or UNDECIDED.
 
         Raises
