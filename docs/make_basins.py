@@ -1,4 +1,4 @@
-"""Make the pictures of basins and of covariant vectors: ``python docs/make_basins.py``, three minutes."""
+"""Make the pictures of basins and of covariant vectors: ``python docs/make_basins.py``, four minutes."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from make_pictures import STYLE, save
+from matplotlib.legend import Legend
 
 import models
-from hybrid import basin_fractions, basins, periodic_orbit, simulate
+from hybrid import HybridSystem, Mode, basin_fractions, basins, edge_state, simulate
+from hybrid.measures import mean
 from hybrid.plot import plot_basins, plot_fractions
 from lyapunov import covariant_vectors
 
@@ -25,8 +27,8 @@ def impact_picture(folder: Path) -> None:
     figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.6), layout="constrained")
     over = {"x": np.linspace(-4.0, 1.2, 520), "v": np.linspace(-4.0, 4.0, 600)}
     plot_basins(basins(system, over, parameters=parameters), ax=left)
-    saddle = periodic_orbit(system, (-1.40, 0.35), periods=2, parameters=parameters)
-    left.plot(*saddle.x0, "wX", markeredgecolor="black", markersize=8)
+    saddle = edge_state(system, (0.0, 0.0), (-1.6, -0.4), parameters=parameters).orbit
+    left.plot(*saddle.arc()(saddle.period / 2), "wX", markeredgecolor="black", markersize=8)
     shares = basin_fractions(
         system,
         {"x": (-4.0, 1.0), "v": (-4.0, 4.0)},
@@ -36,6 +38,37 @@ def impact_picture(folder: Path) -> None:
     )
     plot_fractions(shares, ax=right)
     save(figure, folder / "basins_impact.png")
+
+
+def edge_picture(folder: Path) -> None:
+    """The way from two starts of the impact oscillator to the saddle between their basins."""
+    system, parameters = models.impact_oscillator(), {"w": 2.6}
+    over = {"x": np.linspace(-2.0, 1.1, 310), "v": np.linspace(-2.0, 2.0, 320)}
+    ax = plot_basins(basins(system, over, parameters=parameters), figsize=(6.4, 4.6))
+    starts = (0.5, -1.2), (0.95, -1.0)
+    edge = edge_state(system, *starts, parameters=parameters)
+    ax.plot(*np.transpose(starts), "w--", linewidth=1.0, label="between the starts")
+    x, v = edge.points.T
+    ax.plot(x, v, "wo", markersize=4, markeredgecolor="black", label="the edge trajectory")
+    saddle = np.array([edge.x, edge.orbit.arc()(edge.orbit.period / 2)])
+    ax.plot(*saddle.T, "wX", markersize=9, markeredgecolor="black", label="the saddle")
+    lines = [each for each in ax.lines if not str(each.get_label()).startswith("_")]
+    told = [str(each.get_label()) for each in lines]
+    ax.add_artist(Legend(ax, lines, told, loc="lower left", fontsize=8, facecolor="0.7"))
+    save(ax.figure, folder / "edge_state.png")
+
+
+def features_picture(folder: Path) -> None:
+    """Basins of a pendulum under a constant torque, by the mean speed."""
+    pendulum = HybridSystem(
+        state=("angle", "speed"),
+        parameters={"torque": 0.5, "c": 0.2},
+        modes=[Mode("swing", lambda t, x, p: (x.speed, p.torque - p.c * x.speed - np.sin(x.angle)))],
+    )
+    over = {"angle": np.linspace(-6.0, 6.0, 150), "speed": np.linspace(-4.0, 6.0, 120)}
+    asked = {"mean speed": mean("speed")}
+    found = basins(pendulum, over, features=asked, periods=100, interval=1.0, recurrences=20)
+    save(plot_basins(found, figsize=(6.4, 4.6)).figure, folder / "features_pendulum.png")
 
 
 def founding_picture(folder: Path) -> None:
@@ -73,6 +106,8 @@ def main() -> None:
     folder.mkdir(parents=True, exist_ok=True)
     with plt.rc_context(STYLE):
         impact_picture(folder)
+        edge_picture(folder)
+        features_picture(folder)
         founding_picture(folder)
         angles_picture(folder)
 

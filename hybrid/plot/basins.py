@@ -120,13 +120,18 @@ def _described(basins: xarray.Dataset) -> list[str]:
     for i in range(basins.sizes["attractor"]):
         each = basins.isel(attractor=i)
         share = float((basins.label == i + 1).mean())
-        motion = _features(each) or _words(str(each.kind.values), int(each["round"]), float(each.jumps))
+        motion = _features(each, _sizes(basins)) or _words(
+            str(each.kind.values), int(each["round"]), float(each.jumps)
+        )
         found.append(f"{i + 1}: {motion} ({share:.1%} of the starts)")
     return found
 
 
-def _features(found: xarray.Dataset) -> str:
-    """The features of an attractor in words; of all values of a parameter if there are several."""
+def _features(found: xarray.Dataset, sizes: list[float]) -> str:
+    """The features of an attractor in words, of all values of a parameter if there are several.
+
+    ``sizes`` are those of the features of all attractors.
+    """
     if "features" not in found.data_vars:
         return ""
     low, high = (found[name] for name in ("lowest_feature", "highest_feature"))
@@ -134,8 +139,19 @@ def _features(found: xarray.Dataset) -> str:
     low, high = low.min(along), high.max(along)
     if not np.isfinite(low.values).all():
         return ""
+    names = [str(name) for name in found.feature.values]
     ends = zip(low.values.tolist(), high.values.tolist(), strict=True)
-    return described(dict(zip(map(str, found.feature.values), ends, strict=True)))
+    return described(dict(zip(names, ends, strict=True)), dict(zip(names, sizes, strict=True)))
+
+
+def _sizes(found: xarray.Dataset) -> list[float]:
+    """The largest size of each feature among all attractors; empty without features."""
+    if "features" not in found.data_vars:
+        return []
+    sizes: list[float] = (
+        abs(found.features).max([dim for dim in found.features.dims if dim != "feature"]).values.tolist()
+    )
+    return sizes
 
 
 def _words(kind: str, points: int, jumps: float) -> str:
@@ -218,7 +234,7 @@ def plot_fractions(
 def _name(fractions: xarray.Dataset, label: int) -> str:
     if label < 1:
         return "no attractor" if label == 0 else "violates every mode"
-    told = _features(fractions.sel(label=label))
+    told = _features(fractions.sel(label=label), _sizes(fractions))
     if told:
         return f"{label}: {told}"
     kinds = fractions.kind.sel(label=label).values

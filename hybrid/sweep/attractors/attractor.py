@@ -91,8 +91,12 @@ class Attractor:
         return self.features[arguments.known("name: Feature", name, self.features, "Features")]
 
     def __repr__(self) -> str:
+        return self._told({})
+
+    def _told(self, sizes: Mapping[str, float]) -> str:
+        """The attractor in a line; ``sizes`` are those of the features of all attractors."""
         if self.features:
-            return f"<Attractor: {described(self.ranges)}, {self.jumps:.4g} jumps per point>"
+            return f"<Attractor: {described(self.ranges, sizes)}, {self.jumps:.4g} jumps per point>"
         what = f"{self.kind}, {counted(self.round, 'point')}" if self.round else self.kind
         values = ", ".join(f"{value:.4g}" for value in self.exponents)
         return f"<Attractor: {what}, {self.jumps:.4g} jumps, exponents [{values}]>"
@@ -133,7 +137,9 @@ class Attractors(Mapping[int, Attractor]):
 
     def __repr__(self) -> str:
         lines = [f"<{counted(len(self), 'attractor')}, {self.status.brief}>"]
-        return "\n".join([*lines, *(f"{label}: {each!r}" for label, each in self.items())])
+        names = self._found[0].features if self._found else {}
+        sizes = {name: max(abs(each[name]) for each in self._found) for name in names}
+        return "\n".join([*lines, *(f"{label}: {each._told(sizes)}" for label, each in self.items())])
 
     def _repr_html_(self) -> str:
         """A table for a notebook."""
@@ -183,7 +189,7 @@ class Attractors(Mapping[int, Attractor]):
         variables |= feature_variables(found)
         coords = {"attractor": np.arange(1, len(found) + 1), "exponent": np.arange(1, directions + 1)}
         if found and found[0].features:
-            coords["feature"] = np.array([*found[0].features], dtype=object)
+            coords["feature"] = np.array([*found[0].features])
         return xarray.Dataset(
             variables, {**coords, **self.names.coords()}, attributes("attractors", self.status)
         )

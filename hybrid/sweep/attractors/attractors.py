@@ -67,8 +67,9 @@ def attractors(
     give numbers of it. Runs whose features lie together are one attractor, whatever their states do. Runs are
     joined nearest first (single linkage). The features are taken of two stretches, one after the other, of
     ``recurrences`` points each. Groups of runs are one attractor if in no feature the gap between them is
-    wider than twice the root mean square of the change from stretch to stretch within one of them, or than
-    the square root of the solver's ``rtol`` times the feature. ``together`` gives the widest gap by hand.
+    wider than twice the root mean square of the change from stretch to stretch within one of them, than the
+    square root of the solver's ``rtol`` times the feature, or than that of its ``atol``. ``together`` gives
+    the widest gap by hand. If a run has come back to its points its stretches have whole rounds.
     A run that ends, or with a feature that is not finite, leads to no attractor.
 
     Parameters
@@ -128,7 +129,8 @@ def attractors(
     for computing the basin stability of multi-stable dynamical systems", Nonlinear Dynamics 107 (2022) 1451,
     doi:10.1007/s11071-021-06786-5, group runs by features. P. F. Felzenszwalb, D. P. Huttenlocher, "Efficient
     graph-based image segmentation", International Journal of Computer Vision 59 (2004) 167,
-    doi:10.1023/B:VISI.0000022288.19776.77, join groups by the gap between them and the differences within.
+    doi:10.1023/B:VISI.0000022288.19776.77, join groups by the gap between them and the differences within;
+    here these are differences of a run from itself.
 
     Examples
     --------
