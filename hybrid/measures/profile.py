@@ -19,6 +19,11 @@ LAST = 3
 RESOLVED = 1e-13
 # A part is not halved below this share of its step: there is a kink or a jump in it.
 NARROWEST = 2.0**-44
+# Rounding of a polynomial's values, in units of the sum of its terms: of what rests nothing else is left, and
+# no part resolves that.
+OF_TERMS = 4.0 * float(np.finfo(float).eps)
+# Of an output the terms are not known. But kinks and jumps leave few parts, and rounding leaves all of them.
+MOST_PARTS, MOST_PER_STEP = 2**14, 256
 # A polynomial that exceeds the largest known value by less than this share of it does not exceed it.
 ROUNDING = 1e-15
 # A root of a slope with an imaginary part up to this is an extremum that rounding has moved.
@@ -146,13 +151,17 @@ def profile_of(arc: HybridArc, name: str) -> Profile:
         )
     low, width = np.zeros(len(left)), np.ones(len(left))
     done: list[Parts] = []
-    scale = 0.0
+    scale, rounding, most = 0.0, np.zeros(len(pieces.h)), max(MOST_PARTS, MOST_PER_STEP * len(left))
+    if name in arc.system.state_names:
+        terms = pieces.coefficients[:, :, arc.system.state_names.index(name)]
+        rounding = OF_TERMS * np.abs(terms).sum(axis=1)
     while left.size:
         made = Parts(left, low, width, np.empty((len(left), DEGREE + 1)))
         made = attrs.evolve(made, values=_values_at(arc, quantity, left, made.places))
         scale = max(scale, float(np.abs(made.values).max()))
         tails = np.abs(made.values @ TO_COEFFICIENTS[-LAST:].T).max(axis=1)
-        resolved = (tails <= RESOLVED * scale) | (width < NARROWEST)
+        known = np.maximum(RESOLVED * scale, rounding[left])
+        resolved = (tails <= known) | (width < NARROWEST) | (len(left) > most)
         done.append(made.taken(resolved))
         rest = made.taken(~resolved)
         half = 0.5 * rest.width

@@ -65,11 +65,12 @@ def attractors(
 
     With ``features`` each run settles for ``periods`` points, and functions of the arc over its next points
     give numbers of it. Runs whose features lie together are one attractor, whatever their states do. Runs are
-    joined nearest first (single linkage). The features are taken of two stretches, one after the other, of
-    ``recurrences`` points each. Groups of runs are one attractor if in no feature the gap between them is
-    wider than twice the root mean square of the change from stretch to stretch within one of them, than the
-    square root of the solver's ``rtol`` times the feature, or than that of its ``atol``. ``together`` gives
-    the widest gap by hand. If a run has come back to its points its stretches have whole rounds.
+    joined nearest first (single linkage). The features are taken of three stretches of ``recurrences`` points
+    each, with a half and a fifth of ``periods`` between them. Groups of runs are one attractor if in no
+    feature the gap between them is wider than twice the root mean square of the largest change to the last
+    stretch within one of them, than the square root of the solver's ``rtol`` times the feature, or than that
+    of its ``atol``. ``together`` gives the widest gap by hand. If a run has come back to its points its
+    stretches have whole rounds.
     A run that ends, or with a feature that is not finite, leads to no attractor.
 
     Parameters
@@ -93,7 +94,7 @@ def attractors(
         Points that a run has to settle.
     recurrences
         Points in succession near one attractor that decide a start. With features, the number of points in
-        each of the two stretches: more of them make features of chaos scatter less.
+        each of the stretches: more of them make features of chaos scatter less.
     tolerance
         Two states are near each other if no component differs by more than this share of the distance by
         which it changes along the attractor's orbit. Features do not need it.

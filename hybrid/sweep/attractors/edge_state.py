@@ -289,7 +289,8 @@ def _status(tracking: Tracking, kind: str, saddle: Saddle | None, done: int) -> 
             StatusCode.NOT_CONVERGED,
             f"{trajectory} breaks off: the runs from the two sides are at no point near each other in one "
             f"mode.{noted}",
-            "Take other starts, another t0= if a jump happens at that phase, or a shorter interval=.",
+            "The boundary may lie on a guard. Take other starts, another t0= if a jump happens at that "
+            "phase, or a shorter interval=.",
         )
     return Status(
         StatusCode.NOT_CONVERGED,

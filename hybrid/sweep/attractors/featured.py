@@ -18,7 +18,7 @@ from hybrid.sweep.attractors.groups import Linkage, Precision
 from hybrid.sweep.attractors.runs import CODE, MODE, NONE, OWNER
 from hybrid.sweep.attractors.search import Search
 from hybrid.sweep.attractors.setup import Setup
-from hybrid.sweep.attractors.stretches import STRETCHES, features_in, measured_in_threads, settled
+from hybrid.sweep.attractors.stretches import features_in, measured_in_threads, pauses, settled
 
 
 @attrs.frozen(eq=False)
@@ -110,7 +110,8 @@ class FeatureSearch:
         """
         setup, names = self.setup, self.features.names
         points, length = settled(setup, x0, setup.marked.mode_names[mode])
-        collected(points, (STRETCHES - 1) * length)
+        waits = pauses(setup)
+        collected(points, len(waits) * length + sum(waits))
         jumps = points.trajectory.jumps
         states, places = collected(points, length)
         done = points.code == codes.DONE

@@ -1,10 +1,10 @@
 """Groups of runs whose features lie together.
 
 Runs are joined one after another, the nearest first (single linkage). A run says itself how far apart the
-features of one attractor may be: it is measured over two stretches, one after the other, and both belong to
-one attractor. So two groups are one attractor if the gap between them is no wider than twice the root mean
-square of that difference within one of them. On a periodic orbit the difference is an error of rounding, and
-on a chaotic attractor it is the scatter of the features, so each group brings its own scale.
+features of one attractor may be: they are taken of several stretches, all of which belong to one attractor.
+So two groups are one attractor if the gap between them is no wider than twice the root mean square of that
+change within one of them. On a periodic orbit the change is an error of rounding, and on a chaotic attractor
+it is the scatter of the features, so each group brings its own scale.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Linkage:
     Attributes
     ----------
     values, scatter
-        Features of the runs ``(N, F)``, and how far they differ from those of the stretch before.
+        Features of the runs ``(N, F)``, and how far they differ from stretch to stretch.
     known
         How well features are known.
     apart

@@ -21,8 +21,6 @@ from hybrid.sweep.blocks import run_in_blocks
 
 # Code of a run whose features are not all finite.
 UNMEASURED = StatusCode.NOT_CONVERGED
-# The features of two stretches, one after the other, say how far those of one attractor scatter.
-STRETCHES = 2
 # Last points of the way there in which a round is looked for.
 LOOKED_AT = 256
 
@@ -68,7 +66,7 @@ def measured_in_threads(
 
 
 def features_in(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Features ``(N, F)`` in rows, and how far they changed from the stretch before ``(N, F)``."""
+    """Features ``(N, F)`` in rows, and how far they changed from one stretch to the other ``(N, F)``."""
     values, changes = np.split(rows[:, COLUMNS:], 2, axis=1)
     return values, changes
 
@@ -76,21 +74,31 @@ def features_in(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _measure(setup: Setup, features: Features, x0: np.ndarray, row: np.ndarray) -> None:
     """Fill in the row of a start."""
     points, length = settled(setup, x0, setup.marked.mode_names[int(row[MODE])])
-    where = f"the run from {tuple(x0.tolist())}"
     found: list[np.ndarray] = []
-    while points.code == codes.DONE and len(found) < STRETCHES:
-        arc = _stretch(setup, points, length)
+    for wait in (0, *pauses(setup)):
+        if wait:
+            collected(points, wait)
+        arc = _stretch(setup, points, length) if points.code == codes.DONE else None
         if arc is not None:
-            found.append(features.of(arc, where))
+            found.append(features.of(arc, f"the run from {tuple(x0.tolist())}"))
     if points.code == StatusCode.INTERRUPTED or CTRL_C.is_set():
         return
-    row[POINTS] = setup.periods + STRETCHES * length
+    row[POINTS] = setup.periods + sum(pauses(setup)) + len(found) * length
     if points.code != codes.DONE:
         row[CODE] = points.code
         return
-    before, last = found
-    row[COLUMNS:] = *last, *np.abs(last - before)
+    *before, last = found
+    row[COLUMNS:] = *last, *np.abs(last - before).max(axis=0)
     row[CODE] = StatusCode.SUCCESS if np.isfinite(row[COLUMNS:]).all() else UNMEASURED
+
+
+def pauses(setup: Setup) -> tuple[int, ...]:
+    """Points between one stretch and the next.
+
+    Stretches in succession would differ by too little where a run still settles, or goes slowly round a
+    torus. Two lengths are not both whole turns of that.
+    """
+    return setup.periods // 2, setup.periods // 5
 
 
 def settled(setup: Setup, x0: np.ndarray, mode: str) -> tuple[Points, int]:

@@ -13,7 +13,7 @@ from tests.hybrid.sweep.attractors.test_fractions import Pressed
 from tests.lyapunov.clocked import clocked
 
 PLANE = {"x": (-4.0, 1.0), "v": (-4.0, 4.0)}
-SETTLED = {"periods": 300}
+SETTLED = {"periods": 200}
 
 
 def pendulum():
@@ -35,7 +35,7 @@ def grouped(values, scatter=0.0, apart=None):
 @pytest.mark.parametrize("w_A", [(2.6, 1.0), (2.6, 3.4), (1.0, 1.0)])
 def test_shares_are_those_that_points_find(w_A):
     """Two attractors, three of which two have rounds of four points, and a single one."""
-    given = {"parameters": dict(zip("wA", w_A, strict=True)), "starts": 60, **SETTLED}
+    given = {"parameters": dict(zip("wA", w_A, strict=True)), "starts": 30, **SETTLED}
     system = models.impact_oscillator()
     by_points = hybrid.basin_fractions(system, PLANE, **given)
     asked = {"low": minimum("x"), "mean": mean("x"), "speed": rms("v")}
