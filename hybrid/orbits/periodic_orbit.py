@@ -22,6 +22,7 @@ from hybrid.simulation.periods import check_time
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import DOP853, Solver
 from hybrid.system.clocks import Every, numbers_of
+from hybrid.system.elements import Transition
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.growth import growing
 from hybrid.transform.aged import aged, with_age
@@ -165,6 +166,19 @@ def _check_clocks(
     system: HybridSystem, x: np.ndarray, parameters: Mapping[str, float] | None, t0: float, length: float
 ) -> None:
     """ArgumentError if a clock does not tick at the same phases again after the length of an orbit."""
+    transition = out_of_phase(system, x, parameters, t0, length)
+    if transition is not None and transition.clock is not None:
+        raise ArgumentError(
+            f"periods: the clock of transition {transition.name!r} ticks {transition.clock.told}, not at the "
+            f"same phases again after {length:.6g}, so no orbit closes then. Choose periods= or the system's "
+            "period= such that it does; the times of At never come again."
+        )
+
+
+def out_of_phase(
+    system: HybridSystem, x: np.ndarray, parameters: Mapping[str, float] | None, t0: float, length: float
+) -> Transition | None:
+    """A transition whose clock does not tick at the same phases again after a time; None if there is none."""
     variables = system.variables
     view, p = variables.state_view(x), variables.parameter_view(system.parameter_values(parameters).tolist())
     for transition in system.transitions:
@@ -179,11 +193,8 @@ def _check_clocks(
         else:
             repeats = not np.any((t0 < numbers) & (numbers <= t0 + length))
         if not repeats:
-            raise ArgumentError(
-                f"periods: the clock of transition {transition.name!r} ticks {clock.told}, not at the same "
-                f"phases again after {length:.6g}, so no orbit closes then. Choose periods= or the system's "
-                "period= such that it does; the times of At never come again."
-            )
+            return transition
+    return None
 
 
 def _shown(orbit: PeriodicOrbit) -> PeriodicOrbit:

@@ -13,8 +13,10 @@ from hybrid import arguments
 from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.display.tables import counted
+from hybrid.errors import ArgumentError
 from hybrid.orbits.equilibria.equilibrium import Equilibrium
 from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.orbits.periodic_orbit import out_of_phase
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
@@ -30,7 +32,7 @@ from hybrid.sweep.attractors.edge import (
     PERIODIC,
     EdgeState,
 )
-from hybrid.sweep.attractors.setup import setup_of
+from hybrid.sweep.attractors.setup import Setup, setup_of
 from hybrid.sweep.attractors.tracking import Tracking, TwoStarts
 from hybrid.system.graph import HybridSystem, as_system, check_mode
 from hybrid.system.growth import growing
@@ -98,7 +100,8 @@ def edge_state(
     Raises
     ------
     ArgumentError
-        If an argument does not fit the model, or a state between the starts violates every mode.
+        If an argument does not fit the model, or a state between the starts violates every mode; if the model
+        depends on time without a declared period, or has a clock that does not tick in step with the period.
 
     References
     ----------
@@ -114,8 +117,8 @@ def edge_state(
     ...     state=("x", "v"),
     ...     modes=[hybrid.Mode("roll", lambda t, x, p: (x.v, x.x - x.x**3 - 0.2 * x.v))],
     ... )
-    >>> edge = hybrid.edge_state(wells, (-1.0, 0.5), (1.5, 0.5))
-    >>> edge.kind, abs(edge.x).max() < 1e-9
+    >>> edge = hybrid.edge_state(wells, (-1.0, 0.2), (1.2, 0.1))
+    >>> edge.kind, bool(abs(edge.x).max() < 1e-9)
     ('equilibrium', True)
     """
     as_system("system", system)
@@ -134,6 +137,7 @@ def edge_state(
         "solver": solver,
     }
     setup = setup_of(system, starts[0].x, given)
+    _check_times(setup, starts[0])
     destinations = Destinations(setup)
     with CTRL_C:
         for each in (one, other):
@@ -152,6 +156,27 @@ def edge_state(
         with progress_bar(rounds, "Edge state", shown, "round") as bar:
             done, saddle = _tracked(tracking, rounds, bar)
         return _result(tracking, saddle, done, exchanged=exchanged)
+
+
+def _check_times(setup: Setup, start: Begin) -> None:
+    """ArgumentError if a run that begins at ``t0`` is not what a run does that comes by a period later."""
+    anew = "Edge tracking begins runs anew at t0."
+    if not setup.forced:
+        timed = setup.begin(start.x, start.mode).model.timed
+        if np.any(timed == 1):
+            mode = setup.system.mode_names[int(np.argmax(timed))]
+            raise ArgumentError(
+                f"system: mode {mode!r} may depend on time, and no forcing period is declared. {anew} "
+                "Declare HybridSystem(period=...)."
+            )
+        return
+    late = out_of_phase(setup.system, start.x, setup.parameters, setup.t0, setup.interval)
+    if late is not None and late.clock is not None:
+        raise ArgumentError(
+            f"system: the clock of transition {late.name!r} ticks {late.clock.told}, not at the same phases "
+            f"again after the forcing period {setup.interval:.6g}. {anew} Declare a period that is a "
+            "multiple of both."
+        )
 
 
 def _start(system: HybridSystem, name: str, given: Any, mode: str | None) -> Begin:

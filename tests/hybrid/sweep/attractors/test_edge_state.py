@@ -210,6 +210,28 @@ def test_what_is_between_must_be_allowed():
         hybrid.edge_state(split, found[1], found[2])
 
 
+def test_what_depends_on_time_needs_a_period():
+    """A run that begins anew at ``t0`` must be one that comes by later."""
+
+    def wells(drive, **options):
+        return HybridSystem(
+            state=("x",), modes=[Mode("m", lambda t, x, p: (x.x - x.x**3 + drive(t),))], **options
+        )
+
+    def driven(t):
+        return 0.01 * np.cos(t)
+
+    with pytest.raises(hybrid.ArgumentError, match="mode 'm' may depend on time, and no forcing period"):
+        hybrid.edge_state(wells(driven), (-1.5,), (1.6,))
+    edge = hybrid.edge_state(wells(driven, period=2 * np.pi), (-1.5,), (1.6,))
+    # To first order in the drive: x' = x + drive.
+    assert edge.x == pytest.approx([-0.005], abs=1e-5)
+    assert edge.orbit.multipliers == pytest.approx([np.exp(2 * np.pi)], rel=1e-3)
+    kick = Transition("m", "m", hybrid.Every(1.0), Reset(lambda t, x, p: (0.9 * x.x,)), name="kick")
+    with pytest.raises(hybrid.ArgumentError, match="clock of transition 'kick' ticks"):
+        hybrid.edge_state(wells(driven, period=2 * np.pi, transitions=[kick]), (-1.5,), (1.6,))
+
+
 def test_what_comes_back():
     edge = hybrid.edge_state(duffing(units={"x": "m"}), (-1.0, 0.2), (1.2, 0.1))
     assert repr(edge).startswith("<EdgeState equilibrium: <Equilibrium x = 0, v = 0 in 'roll'")
