@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,8 @@ BACK = 1e-2
 # Newton's method has found the orbit that the trajectory has come to if it moved the point by no more than
 # so many times the distance by which the points came back.
 MOVED = 10.0
+# Another return than the first one is looked at if it is nearer by this factor.
+NEARER = 0.1
 # States in which the returns of a run are looked for.
 LOOKED_AT = 4096
 
@@ -36,16 +39,30 @@ def closed(tracking: Tracking) -> Equilibrium | PeriodicOrbit | None:
 
 def _orbit_of_periods(tracking: Tracking, x: np.ndarray, mode: str) -> PeriodicOrbit | None:
     """The orbit that closes after as many forcing periods as the points of the trajectory come back after."""
-    setup, modes = tracking.setup, np.array(tracking.modes)
+    modes = np.array(tracking.modes)
     far = tracking.width(tracking.points[:-1], tracking.points[-1])[::-1]
-    back = np.flatnonzero((far <= BACK) & (modes[-2::-1] == modes[-1]))
+    far = np.where(modes[-2::-1] == modes[-1], far, np.inf)
+    back = np.flatnonzero(far <= BACK)
     if not back.size:
         return None
-    count, distance = int(back[0]) + 1, float(far[back[0]])
+    first, nearest = int(back[0]), int(np.argmin(far))
+    # Points of a long orbit come near each other before they come back.
+    counts = [first, nearest] if far[nearest] < NEARER * far[first] else [first]
+    for i in counts:
+        orbit = _near_orbit(tracking, x, mode, i + 1, float(far[i]))
+        if orbit is not None:
+            return orbit
+    return None
+
+
+def _near_orbit(
+    tracking: Tracking, x: np.ndarray, mode: str, periods: int, distance: float
+) -> PeriodicOrbit | None:
+    """The orbit of so many forcing periods, if it is as near as the points came back."""
+    setup = tracking.setup
+    options: dict[str, Any] = {"mode": mode, "parameters": setup.parameters, "t0": setup.t0}
     try:
-        orbit = periodic_orbit(
-            setup.system, x, mode=mode, parameters=setup.parameters, t0=setup.t0, periods=count
-        )
+        orbit = periodic_orbit(setup.system, x, periods=periods, **options)
     except HybridError:
         return None
     near = orbit.closes and _moved(tracking, orbit.x0, x) <= MOVED * max(distance, APART)

@@ -36,8 +36,9 @@ class EdgeState:
         The model, and the values of all its parameters, by name.
     kind
         ``"equilibrium"`` or ``"periodic"``: a saddle, in ``equilibrium`` or ``orbit``; ``"not periodic"`` if
-        the trajectory wanders in a set of constant size without coming back; ``"not settled"`` if the rounds
-        ended before; ``"no edge"`` if the two starts do not lead to different attractors.
+        the trajectory wanders in a set of constant size and no orbit is found near it; ``"not settled"`` if
+        the rounds ended before, or the two runs were nowhere near each other in one mode; ``"no edge"`` if
+        the two starts do not lead to different attractors.
     x, mode, t0
         A state on the boundary ``(n,)``, its mode, and the time there: that of the orbit or the equilibrium
         if there is one, and the last one of the trajectory otherwise.

@@ -307,7 +307,7 @@ def _status(tracking: Tracking, kind: str, saddle: Saddle | None, done: int) -> 
         return Status(
             StatusCode.SUCCESS,
             f"{trajectory} wanders in a set of constant size, and Newton's method finds no orbit with one "
-            f"unstable direction near it.{noted}",
+            f"unstable direction near it. More rounds= would look for a longer one.{noted}",
         )
     if tracking.lost:
         return Status(
