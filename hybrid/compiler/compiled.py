@@ -64,6 +64,8 @@ class CompiledSystem:
         What runs by one solver have in common, kept here by those who make runs.
     periodic_at
         Parameter vectors at which the declared period was found to be one, where that is not proved.
+    last_model
+        The functions at a point, at the parameter vector of the last call.
 
     Examples
     --------
@@ -80,6 +82,7 @@ class CompiledSystem:
     parts: dict[str, Any] = attrs.field(factory=dict, init=False)
     plans: dict[Any, Any] = attrs.field(factory=dict, init=False)
     periodic_at: set[bytes] = attrs.field(factory=set, init=False)
+    last_model: dict[tuple[bytes, int], Any] = attrs.field(factory=dict, init=False)
 
     def __repr__(self) -> str:
         system = self.system
@@ -123,8 +126,8 @@ class CompiledSystem:
         """
         out = np.full(function.rows, np.nan)
         offset = BEFORE.get(function.kind, 0) * len(self.system.transitions)
-        values = self.with_tables(np.array(parameters, dtype=float), row)
-        self._call("vector_function", FUNCTION_NUMBERS[function.kind], index + offset, t, x, values, out)
+        model = self._model_at(parameters, row)
+        self._call("vector_function", model, FUNCTION_NUMBERS[function.kind], index + offset, t, x, out)
         return out
 
     def derivative(
@@ -138,18 +141,27 @@ class CompiledSystem:
     ) -> np.ndarray:
         """The derivative ``(rows, n + 1)`` of a function; the last column is the derivative in time."""
         out = np.full((function.rows, self.system.dimension + 1), np.nan)
-        values = self.with_tables(np.array(parameters, dtype=float), row)
+        model = self._model_at(parameters, row)
         if function.size is None:
-            self._call("vector_function", GRADIENT, index, t, x, values, out[0])
+            self._call("vector_function", model, GRADIENT, index, t, x, out[0])
         else:
-            self._call("matrix_function", FUNCTION_NUMBERS[function.kind], index, t, x, values, out)
+            self._call("matrix_function", model, FUNCTION_NUMBERS[function.kind], index, t, x, out)
         return out
 
-    def _call(
-        self, kernel: str, number: int, index: int, t: float, x: Any, parameters: Any, out: np.ndarray
-    ) -> None:
+    def _model_at(self, parameters: np.ndarray, row: int) -> Any:
+        """The functions at a point, at a parameter vector; the last one is kept for the next call."""
+        values = np.array(parameters, dtype=float)
+        key = values.tobytes(), row
+        found = self.last_model.get(key)
+        if found is None:
+            found = self._model.replace(parameters=self.with_tables(values, row))
+            self.last_model.clear()
+            self.last_model[key] = found
+        return found
+
+    @staticmethod
+    def _call(kernel: str, model: Any, number: int, index: int, t: float, x: Any, out: np.ndarray) -> None:
         call = vars(load_kernels("hybrid.kernels.evaluate"))[kernel]
-        model = self._model.replace(parameters=parameters)
         call(model, number, index, float(t), np.array(x, dtype=float), out)
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -62,6 +62,8 @@ class Recorder:
         self.grazings: list[Grazing] = []
         # Bytes of the steps and jumps that are kept.
         self.kept = 0
+        # The code that the run ended with.
+        self.code = codes.DONE
 
     def run(self, t1: float, max_jumps: int) -> HybridArc:
         """Run to ``t1`` or until something else ends the run."""
@@ -71,6 +73,7 @@ class Recorder:
         code = self._advance(t1, max_jumps)
         if code == codes.RECORD_FULL:
             code = self._go_on(t1, max_jumps)
+        self.code = code
         run = trajectory.run
         jumps = run.jumps - self.before
         end = Last(t1 if code == codes.DONE else trajectory.t, trajectory.x, run.mode, jumps)

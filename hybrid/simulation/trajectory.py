@@ -113,7 +113,8 @@ def explore(system: HybridSystem, t0: float, state: np.ndarray, values: np.ndarr
 class Common:
     """What runs share that begin at one time by one solver: they differ in start and parameters.
 
-    The fields are those of ``start``, everything about them checked.
+    The fields are those of ``start``, everything about them checked; ``max_steps`` is given where it is not
+    that of the solver.
     """
 
     compiled: CompiledSystem
@@ -123,6 +124,7 @@ class Common:
     time: str = "t0"
     horizon: float = 0.0
     stop: Stop = CTRL_C
+    max_steps: int | None = None
 
     def begin_at(self, state: np.ndarray, mode: str | None, values: np.ndarray) -> Trajectory:
         """A trajectory at its start, at a parameter vector."""
@@ -151,8 +153,7 @@ class Common:
             memory.begin(model, state, self.tangent, self.t0, self.horizon)
             choose_mode(compiled.system, plan, model, memory.run, memory.work, mode)
         memory.run.mode = index
-        most = self.solver.max_steps
-        return Trajectory(compiled, plan, model, memory, tangents, most, phase0, beyond, self.stop)
+        return Trajectory(compiled, plan, model, memory, tangents, self._most, phase0, beyond, self.stop)
 
     def go_on(self, end: ArcEnd, model_of: Callable[[Plan, Memory], Any]) -> Trajectory:
         """A trajectory that goes on from the end of a run."""
@@ -165,8 +166,13 @@ class Common:
         model = model_of(plan, memory)
         phase0 = memory.begin(model, end.x, self.tangent, self.t0, self.horizon)
         put_memory(end, memory.run, compiled.system)
-        most, jumps = self.solver.max_steps, int(memory.run.jumps)
-        return Trajectory(compiled, plan, model, memory, tangents, most, phase0, (), self.stop, jumps)
+        jumps = int(memory.run.jumps)
+        return Trajectory(compiled, plan, model, memory, tangents, self._most, phase0, (), self.stop, jumps)
+
+    @property
+    def _most(self) -> int:
+        """The largest number of steps."""
+        return self.solver.max_steps if self.max_steps is None else self.max_steps
 
 
 @attrs.frozen(eq=False)

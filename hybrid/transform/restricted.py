@@ -49,6 +49,7 @@ def restricted(
             units={},
             outputs={},
             laws=Laws(),
+            growth=None,
         )
         made[key] = made_by(found, restricted, system, *key)
     return made[key]

@@ -15,8 +15,7 @@ from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.passing import CLOSED, Flow, Landing, Pass
 from hybrid.orbits.continuation.route import Loop, Route, Stretch
 from hybrid.orbits.held import Held
-from hybrid.simulation.arc import HybridArc
-from hybrid.simulation.simulate import simulate
+from hybrid.simulation.repeated import Repeated
 from hybrid.solvers import Solver
 from hybrid.system.functions import field_function, guard_function, reset_function
 from hybrid.system.graph import HybridSystem
@@ -60,6 +59,7 @@ class Family:
     least: np.ndarray | float = 0.0
     counted: np.ndarray | float = 0.0
     held: Held | None = None
+    _runs: dict[tuple[str, tuple[str, ...], bool, bool], Repeated] = attrs.field(factory=dict, init=False)
 
     @property
     def n(self) -> int:
@@ -210,27 +210,36 @@ class Family:
         """The motion of a stretch; ArithmeticError if it does not end in so many steps or jumps."""
         n, state = len(x), self.extended_state(np.append(x, stretch.counters), values)
         mode = self.extended.mode_index(stretch.mode)
-        last_mode = self.extended.mode_index(stretch.end_mode)
-        first_rate = self._rate(mode, begin, state)
         if no_time(begin, end):
-            last_rate = self._rate(last_mode, end, state)
+            first_rate = self._rate(mode, begin, state)
+            last_rate = self._rate(self.extended.mode_index(stretch.end_mode), end, state)
             moved = x + (end - begin) * first_rate
             return Flow(None, moved, np.eye(n, n + len(values)), first_rate, last_rate, stretch.counters)
-        forwards = end > begin
+        way = 1.0 if end > begin else -1.0
         # Where the field has roots of a guard it is smooth on either side of that alone.
         sided = not stretch.within and self.compiled.emitted.propagators[mode].root > 1
-        system = restricted(self.extended, stretch.mode, stretch.within, not forwards, sided)
         start = stretch.mode
         if sided and self._is_beyond(start, begin, state):
             start = BEYOND + start
-        arc = self._run(system, start, state, (begin, end) if forwards else (-begin, -end), most)
-        if not arc.status.ok or str(arc.mode[-1]).removeprefix(BEYOND) != stretch.end_mode:
+        runs = self._runs_of(stretch.mode, stretch.within, way < 0.0, sided)
+        limits = (self.solver.max_steps, MOST_JUMPS) if most is None else (most, most)
+        try:
+            led = runs.run(start, state, (way * begin, way * end), *limits)
+        except ArgumentError as error:
+            raise ArithmeticError from error
+        if not led.ok or led.mode.removeprefix(BEYOND) != stretch.end_mode:
             raise ArithmeticError
-        assert arc.fundamental is not None
-        found = arc.x[-1, :n], arc.fundamental[:n], first_rate, self._rate(last_mode, end, arc.x[-1])
-        if not all(np.all(np.isfinite(each)) for each in found):
+        found = led.x[:n], led.tangents[:n], way * led.first_rate[:n], way * led.last_rate[:n]
+        if not all(np.isfinite(each).all() for each in found):
             raise ArithmeticError
-        return Flow(arc, *found, tuple(arc.x[-1, n + len(values) :].tolist()))
+        return Flow(led.arc, *found, tuple(led.x[n + len(values) :].tolist()))
+
+    def _runs_of(self, mode: str, within: tuple[str, ...], backwards: bool, sided: bool) -> Repeated:
+        """The runs along a mode without its guards, or with those of some transitions."""
+        key = mode, within, backwards, sided
+        if key not in self._runs:
+            self._runs[key] = Repeated(restricted(self.extended, *key), self.fixed, self.solver)
+        return self._runs[key]
 
     def _is_beyond(self, mode: str, t: float, state: np.ndarray) -> bool:
         """Whether a state is beyond a guard at which its mode ends."""
@@ -331,25 +340,6 @@ class Family:
         """Derivatives ``(n + 1,)`` of the guard of a transition in the state and the time."""
         found = self._guard(name, t, self.extended_state(x, values))[1]
         return np.delete(found, np.s_[self.n : len(found) - 1])
-
-    def _run(
-        self, system: HybridSystem, mode: str, state: np.ndarray, span: tuple[float, float], most: int | None
-    ) -> HybridArc:
-        """A run with its tangent vectors, of ``most`` steps and jumps at most."""
-        solver = self.solver if most is None else attrs.evolve(self.solver, max_steps=most)
-        try:
-            return simulate(
-                system,
-                state,
-                span,
-                mode=mode,
-                parameters=self.fixed,
-                solver=solver,
-                tangent=np.eye(system.tangent_dimension),
-                max_jumps=MOST_JUMPS if most is None else most,
-            )
-        except ArgumentError as error:
-            raise ArithmeticError from error
 
 
 def no_time(begin: float, end: float) -> bool:

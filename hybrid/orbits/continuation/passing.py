@@ -51,13 +51,26 @@ class Flow:
     last_rate: np.ndarray
     counters: tuple[float, ...] = ()
 
+    @property
+    def by_unknowns(self) -> np.ndarray:
+        """Derivatives ``(n, n + 2 + k)`` of the end in the start, in both times and in the parameters."""
+        n = len(self.end)
+        found = np.empty((n, self.slopes.shape[1] + 2))
+        found[:, :n], found[:, n + 2 :] = self.slopes[:, :n], self.slopes[:, n:]
+        found[:, n] = -self.slopes[:, :n] @ self.first_rate
+        found[:, n + 1] = self.last_rate
+        return found
+
     def at(self, shares: np.ndarray) -> np.ndarray:
         """States ``(N, n)`` at shares ``(N,)`` of the time."""
-        if self.arc is None:
+        pieces = None if self.arc is None else self.arc._pieces
+        if pieces is None or not len(pieces.t):
             return np.tile(self.end, (len(shares), 1))
-        begin, end = self.arc.t[0], self.arc.t[-1]
+        begin, end = pieces.t[0], pieces.t[-1] + pieces.h[-1]
         times = np.clip(begin + shares * (end - begin), begin, end)
-        return np.asarray(self.arc(times)[:, : len(self.end)])
+        states = pieces.at(times)[0][:, : len(self.end)]
+        states[shares >= 1.0] = self.end
+        return states
 
 
 @attrs.frozen(eq=False)
@@ -386,27 +399,29 @@ class Pass:
         first, last = count * n, count * n + count + 1
         matrix, values = np.zeros((last, last + k)), np.zeros(last)
         for i, (flow, landing) in enumerate(zip(self.flows, self.landings, strict=True)):
-            # How the end depends on all unknowns.
-            end = np.zeros((n, last + k))
-            end[:, i * n : (i + 1) * n], end[:, last:] = flow.slopes[:, :n], flow.slopes[:, n:]
-            end[:, first + i] -= flow.slopes[:, :n] @ flow.first_rate
-            end[:, first + i + 1] += flow.last_rate
-            rows, after = slice(i * n, (i + 1) * n), slice((i + 1) % count * n, ((i + 1) % count + 1) * n)
+            rows, own, times = slice(i * n, (i + 1) * n), first + i, slice(first + i, first + i + 2)
+            reached = flow.by_unknowns
             if landing is None:
-                matrix[rows], values[rows] = end, flow.end
-                self._join(i, matrix[first + i], values, first)
+                values[rows] = flow.end
+                self._join(i, matrix[own], values, first)
             else:
-                matrix[rows], values[rows] = landing.slopes[:, :n] @ end, landing.after
-                matrix[rows, last:] += landing.slopes[:, n:-1]
-                matrix[rows, first + i + 1] += landing.slopes[:, -1]
-                row = landing.gradient[:n] @ end
-                row[last:] += landing.gradient[n:-1]
-                row[first + i + 1] += landing.gradient[-1]
-                matrix[first + i], values[first + i] = row, landing.height
-            matrix[rows, after] -= np.eye(n)
-            values[rows] = closed_change(
-                values[rows] - self.loop.x[(i + 1) % count], self.family.system.turn_lengths[:n]
-            )
+                row = landing.gradient[:n] @ reached
+                row[n + 1] += landing.gradient[-1]
+                row[n + 2 :] += landing.gradient[n:-1]
+                matrix[own, rows], matrix[own, times], matrix[own, last:] = np.split(row, (n, n + 2))
+                values[own] = landing.height
+                reached = landing.slopes[:, :n] @ reached
+                reached[:, n + 1] += landing.slopes[:, -1]
+                reached[:, n + 2 :] += landing.slopes[:, n:-1]
+                values[rows] = landing.after
+            matrix[rows, rows] = reached[:, :n]
+            matrix[rows, times] = reached[:, n : n + 2]
+            matrix[rows, last:] = reached[:, n + 2 :]
+        here = np.arange(first)
+        matrix[here, (here + n) % first] -= 1.0
+        change = values[:first].reshape(count, n) - np.roll(self.loop.x, -1, axis=0)
+        turns = self.family.system.turn_lengths[:n]
+        values[:first] = (closed_change(change, turns) if turns.any() else change).ravel()
         if self.departure is not None and anchor.departure is not None:
             self._hold(*self.departure, anchor.departure[1][:, :n], anchor.scale, matrix, values)
         self._close(anchor, matrix[-1], values, first)
