@@ -219,7 +219,7 @@ def located(place: Place, after: Place) -> Change | None:
         length = distance(near, far)
         if not length > SHORTEST:
             break
-        made = near.step(np.array([share * length]))
+        made = near.towards(far).step(np.array([share * length]))
         if made is None:
             # It is reached from nearer.
             share /= 2.0
@@ -249,7 +249,7 @@ def _simplest(change: Change) -> Change:
     onward = change.onward.place
     if onward is None or len(onward.family.route) >= len(change.place.family.route):
         return change
-    back = attrs.evolve(onward, tangents=-onward.tangents, bend=0.0)
+    back = attrs.evolve(onward, tangents=-onward.tangents)
     reached = abs(onward.value - change.place.value) + SHORTEST
     for length in reached / float(onward.sizes[0]) * np.array([2.0, 8.0, 32.0]):
         made = back.step(np.array([length]))
@@ -266,7 +266,7 @@ def _explained(base: Place, near: Place, far: Place) -> Iterator[tuple[Place, Ke
 
     They have another sign at a real place ``base``, the nearer one or one before it.
     """
-    ahead = distance(base, far)
+    ahead, base = distance(base, far), base.towards(far)
     for key in changed(base.orbit, far.orbit):
         clearance = partial(_clearance_at, clearance_of(key))
         found = interpolated_zero(base, clearance, (0.0, ahead))

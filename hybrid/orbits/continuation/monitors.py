@@ -89,12 +89,12 @@ class Monitors:
 
 def _at_change(place: Place, beyond: Place) -> Place | None:
     """An orbit of the route beyond a change, at the parameter of the change; None if none is found."""
-    back = attrs.evolve(beyond, tangents=-beyond.tangents, bend=0.0)
+    back = attrs.evolve(beyond, tangents=-beyond.tangents)
     apart = abs(beyond.value - place.value) / float(beyond.sizes[0])
     for length in apart * np.array(FARTHER):
         made = back.step(np.array([length]))
         if made is not None:
             found = zero_between(back, made[0], lambda each: each.value - place.value)
             if found is not None:
-                return attrs.evolve(found, tangents=-found.tangents, bend=0.0)
+                return attrs.evolve(found, tangents=-found.tangents)
     return None

@@ -16,7 +16,7 @@ from hybrid.orbits.continuation.parts import divided, growth, holding
 from hybrid.orbits.continuation.passing import CLOSED, Pass
 from hybrid.orbits.continuation.route import LARGEST_GROWTH, Loop, route_of
 from hybrid.orbits.held import conserved_at
-from hybrid.orbits.zeros import SHARES, at_zero, zero_on_the_way
+from hybrid.orbits.zeros import SHARES, at_zero, interpolated, zero_on_the_way
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver
@@ -36,6 +36,12 @@ LOOSE = 1e-7
 # A zero between two places may lie outside of them by this share of their distance.
 BESIDE = 1e-3
 MOST_ROUNDS = 5
+# Places that a step is guessed from are not nearer to each other than this part of it.
+NEAREST = 8.0
+
+
+# Unknowns ``(m + k,)`` of an orbit and the direction of its branch there, neither of them scaled.
+Knot = tuple[np.ndarray, np.ndarray]
 
 
 @attrs.frozen(eq=False)
@@ -50,8 +56,8 @@ class Place:
         Orthonormal directions ``(k, m + k)`` of the solutions there, in scaled unknowns.
     sizes
         Units ``(k,)`` of the parameters.
-    bend
-        Derivative ``(m + k,)`` of the first tangent along the branch, as far as it is known.
+    path
+        Unknowns ``(m + k,)`` of other places of the branch, at most two, each with the tangent there.
     firm
         Whether the equations hold the orbit on the branch: not where other orbits are beside it.
     """
@@ -59,7 +65,7 @@ class Place:
     orbit: Pass
     tangents: np.ndarray
     sizes: np.ndarray
-    bend: np.ndarray | float = 0.0
+    path: tuple[Knot, ...] = ()
     firm: bool = True
 
     @property
@@ -87,13 +93,30 @@ class Place:
         """The first free parameter."""
         return float(self.orbit.loop.values[0])
 
+    @property
+    def knot(self) -> Knot:
+        """The unknowns and the tangent, for places beside this one."""
+        return self.orbit.loop.flat, self.units * self.tangents[0]
+
+    def towards(self, other: Place) -> Place:
+        """The same place, knowing another place of its branch between which and this one steps will lead."""
+        return attrs.evolve(self, path=(other.knot, *self.path[:1]))
+
     def step(self, lengths: np.ndarray) -> tuple[Place, int] | None:
         """The place at distances ``(k,)`` along the tangents, and how many corrections it took; or None."""
         units, length = self.units, float(np.abs(lengths).max())
-        guess = self.orbit.loop.plus(units * (lengths @ self.tangents + 0.5 * lengths[0] ** 2 * self.bend))
+        reach = max(length / 2.0, SHORTEST_STEP)
+        flat = self.orbit.loop.flat
+        change = units * (lengths @ self.tangents)
+        if len(lengths) == 1:
+            curved = interpolated(self._knots_for(length), float(lengths[0])) - flat
+            # What the other places say is worth nothing where it is another way.
+            change = curved if np.abs((curved - change) / units).max() <= reach else change
         try:
-            reach = max(length / 2.0, SHORTEST_STEP) if self.firm else np.inf
-            made = self.family.corrected(guess, self.orbit, units, self.tangents, reach)
+            within = reach if self.firm else np.inf
+            made = self.family.corrected(
+                self.orbit.loop.plus(change), self.orbit, units, self.tangents, within
+            )
         except ArgumentError:
             return None
         if made is None:
@@ -101,10 +124,24 @@ class Place:
         found = place_of(made[0], self.tangents, self.sizes)
         if found is None or np.any(np.sum(found.tangents * self.tangents, axis=1) < LEAST_COSINE):
             return None
-        if len(lengths) == 1 and lengths[0] != 0.0:
-            bend = (found.tangents[0] - self.tangents[0]) / lengths[0]
-            found = attrs.evolve(found, bend=bend)
+        if len(lengths) == 1:
+            found = attrs.evolve(found, path=(self.knot, *self.path[:1]))
         return found, made[1]
+
+    def _knots_for(self, length: float) -> list[tuple[float, np.ndarray, np.ndarray]]:
+        """Distances along the tangent, unknowns and their slopes, here and where the path knows them.
+
+        Places that are much nearer than a step or to each other would carry their rounding far.
+        """
+        flat, units, tangent = self.orbit.loop.flat, self.units, self.tangents[0]
+        found = [(0.0, flat, units * tangent)]
+        for there, direction in self.path:
+            along = float(tangent @ (direction / units))
+            s = float(tangent @ ((there - flat) / units))
+            apart = min(abs(s - each) for each, *_ in found)
+            if abs(along) > LEAST_COSINE**2 and apart > max(length, abs(s)) / NEAREST:
+                found.append((s, there, direction / along))
+        return found
 
 
 def at_value(place: Place, value: float) -> Place | None:
@@ -124,9 +161,10 @@ def distance(place: Place, other: Place) -> float:
 
 def zero_between(place: Place, after: Place, function: Callable[[Place], float]) -> Place | None:
     """The place between two of one branch where a function of places changes its sign."""
+    near = place.towards(after)
 
     def step(s: float) -> Place | None:
-        made = place.step(np.array([s]))
+        made = near.step(np.array([s]))
         return None if made is None else made[0]
 
     return zero_on_the_way({0.0: place, distance(place, after): after}, step, function)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator, Iterator
 
 import numpy as np
 
 from hybrid.orbits.continuation.change import Change, located
 from hybrid.orbits.continuation.event import Event
+from hybrid.orbits.continuation.family import ROUNDING
 from hybrid.orbits.continuation.hopf import hopf_end
 from hybrid.orbits.continuation.instants import SAME, halves, passes_by
 from hybrid.orbits.continuation.monitors import Monitors
 from hybrid.orbits.continuation.place import (
+    LEAST_COSINE,
     SHORTEST_STEP,
     Place,
     at_value,
@@ -28,9 +31,10 @@ from hybrid.simulation.simulate import simulate
 # Lengths of steps along the branch, in units of the sizes of the orbit and of the range of the parameter.
 FIRST_STEP = 0.01
 LONGEST_STEP = 0.05
-# A step is lengthened after few corrections.
+# A step is lengthened after few corrections, as long as it is not to turn by more than this angle.
 FEW_CORRECTIONS = 3
 LONGER = 1.5
+TURN = 0.8 * math.acos(LEAST_COSINE)
 # An orbit that is larger than the first one by this factor, the square root of rounding, grows without bound.
 UNBOUNDED = 2.0**26
 # Along the last part of a walk, of this length, the parameter stands still if it changes by this share of its
@@ -46,6 +50,8 @@ OVER = 1.5
 AHEAD = 1e-4
 # A change of the route this near to the one before, in the range of the parameter, is the same one.
 SAME_CHANGE = 1e-7
+# What is this near to a change, as a share of the step to it, belongs to the change.
+SHY = 1e-3
 
 
 def walk(
@@ -55,6 +61,7 @@ def walk(
     monitors.start(place)
     length, start, passed = FIRST_STEP, place, list[tuple[tuple[Route, ...], float]]()
     trace: list[tuple[float, float, float]] = []
+    curvature = 0.0
     for _ in range(most):
         made = place.step(np.array([length]))
         if made is None:
@@ -93,7 +100,7 @@ def walk(
             if isinstance(onward, str):
                 yield onward
                 return
-            place, length = onward, min(length, FIRST_STEP)
+            place, length, curvature = onward, min(length, FIRST_STEP), 0.0
             yield place
             continue
         share = None if place is start else passes_by(start, place, after)
@@ -113,10 +120,23 @@ def walk(
         if why:
             yield why
             return
-        if corrections <= FEW_CORRECTIONS:
-            length = min(LONGEST_STEP, LONGER * length)
+        longer = LONGER if corrections <= FEW_CORRECTIONS else 1.0
+        before, curvature = curvature, _curvature(place, after)
+        length = min(LONGEST_STEP, longer * length, _turning_little(before, curvature))
         place = refined(after)
     yield "most"
+
+
+def _curvature(place: Place, after: Place) -> float:
+    """By what angle the branch turns from one place to the next, per distance between them."""
+    turn = math.acos(min(1.0, float(after.tangents[0] @ place.tangents[0])))
+    return turn / max(distance(place, after), SHORTEST_STEP)
+
+
+def _turning_little(before: float, curvature: float) -> float:
+    """The length of a step that turns by no more than it may, if the curvature changes on as it did."""
+    growth = curvature / before if before > 0.0 else 1.0
+    return TURN / max(curvature * max(growth, 1.0), TURN)
 
 
 def _past(
@@ -132,8 +152,7 @@ def _past(
     """
     (low, high), last, beyond = span, change.place, change.onward.place
     near = SAME_CHANGE * float(place.sizes[0])
-    # Where a guard has no speed the parameter may stand still: that is no fold.
-    yield from _between(place, last, monitors, near)
+    yield from _between(place, last, monitors, before=_just_before(place, last))
     met = (change.routes, last.value)
     again = any(routes == met[0] and abs(value - met[1]) < near for routes, value in passed)
     if not again and change.alters:
@@ -197,13 +216,19 @@ def _to_the_edge(
         yield last
 
 
-def _between(place: Place, after: Place, monitors: Monitors, near: float = -1.0) -> list[Event]:
+def _just_before(place: Place, last: Place) -> Place:
+    """The place just before a change: at the change a guard may have no speed, and no test means anything."""
+    reach, slope = distance(place, last), abs(float(place.tangents[0, -1]))
+    made = place.towards(last).step(np.array([reach - min(SAME_CHANGE / max(slope, ROUNDING), SHY * reach)]))
+    return last if made is None else made[0]
+
+
+def _between(place: Place, after: Place, monitors: Monitors, before: Place | None = None) -> list[Event]:
     """The smooth bifurcations between two places and the zeros of other functions, in order.
 
-    Smooth ones whose parameter is as ``near`` to that of the other place are left out.
+    The smooth ones are looked for up to another place ``before`` the second, if there is one.
     """
-    smooth = [each for each in _smooth(place, after) if abs(each.place.value - after.value) > near]
-    found = [*smooth, *monitors.between(place, after)]
+    found = [*_smooth(place, before or after), *monitors.between(place, after)]
     return sorted(found, key=lambda each: distance(place, each.place))
 
 
