@@ -73,11 +73,14 @@ class Profile:
         The arc, and what is looked at.
     parts
         Parts that cover all steps in whose modes the quantity has a value.
+    largest
+        The largest value of the quantity times a sign, by this sign, as far as it is known.
     """
 
     arc: HybridArc
     quantity: Evaluator
     parts: Parts
+    largest: dict[float, float]
 
     def maximum(self) -> float:
         """The largest value; at a jump, both sides count."""
@@ -116,6 +119,11 @@ class Profile:
 
     def _largest(self, sign: float) -> float:
         """The largest value of the quantity times a sign."""
+        if sign not in self.largest:
+            self.largest[sign] = self._searched(sign)
+        return self.largest[sign]
+
+    def _searched(self, sign: float) -> float:
         arc, parts, values = self.arc, self.parts, sign * self.parts.values
         # States between jumps at one instant are on no step.
         points = self.quantity(arc.t, arc.x, arc._mode_index, arc._values)
@@ -134,7 +142,7 @@ class Profile:
 
 
 def profile_of(arc: HybridArc, name: str) -> Profile:
-    """The profile of a component or an output.
+    """The profile of a component or an output; what is found of it stays with the arc.
 
     Raises
     ------
@@ -142,12 +150,21 @@ def profile_of(arc: HybridArc, name: str) -> Profile:
         If the arc has no dense output or takes no time, or if the quantity has no value or one that is not
         finite.
     """
-    pieces, quantity = _pieces_of(arc), Evaluator(arc.system, name)
+    if name not in arc.resolved:
+        quantity = Evaluator(arc.system, name)
+        arc.resolved[name] = quantity, _parts_of(arc, quantity), {}
+    return Profile(arc, *arc.resolved[name])
+
+
+def _parts_of(arc: HybridArc, quantity: Evaluator) -> Parts:
+    """Parts on which a polynomial resolves a quantity."""
+    pieces = _pieces_of(arc)
     has_value = np.array([quantity.has_value_in(mode) for mode in range(len(arc.system.modes))])
     [left] = np.nonzero(has_value[pieces.mode] & (pieces.h > 0.0))
     if not left.size:
         raise ArgumentError(
-            f"name: output {name!r} has no value in any mode of the arc. Give it one there, such as 0.0."
+            f"name: output {quantity.name!r} has no value in any mode of the arc. Give it one there, such as "
+            "0.0."
         )
     low, width = np.zeros(len(left)), np.ones(len(left))
     done: list[Parts] = []
@@ -167,10 +184,9 @@ def profile_of(arc: HybridArc, name: str) -> Profile:
         half = 0.5 * rest.width
         left, width = np.repeat(rest.step, 2), np.repeat(half, 2)
         low = np.column_stack([rest.low, rest.low + half]).ravel()
-    parts = Parts(
+    return Parts(
         *(np.concatenate([getattr(each, field.name) for each in done]) for field in attrs.fields(Parts))
     )
-    return Profile(arc, quantity, parts)
 
 
 def _pieces_of(arc: HybridArc) -> Pieces:
@@ -226,7 +242,7 @@ def _turns(coefficients: np.ndarray) -> Iterator[float]:
         # The slope keeps its sign.
         return
     size = np.abs(slope).max()
-    roots = chebyshev.chebroots(chebyshev.chebtrim(slope, ROUNDING * size))
+    roots = chebyshev.chebroots(chebyshev.chebtrim(slope, RESOLVED * size))
     for root in roots[np.abs(roots.imag) <= NEARLY_REAL]:
         if abs(root.real) < 1.0:
             yield float(root.real)

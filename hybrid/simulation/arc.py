@@ -226,6 +226,11 @@ class HybridArc(Asked):
             raise ArgumentError("This arc has no samples. Run simulate with samples= and sensitivities=.")
         return found.sampled
 
+    @cached_property
+    def resolved(self) -> dict[str, Any]:
+        """What measures have found of the components and outputs that they were asked for, by name."""
+        return {}
+
     @property
     def keeps_jumps(self) -> bool:
         """Whether the run kept its jumps, so that ``jumps`` holds them."""
