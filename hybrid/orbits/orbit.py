@@ -162,12 +162,24 @@ class PeriodicOrbit:
 
     def arc(self, solver: Solver | None = None) -> HybridArc:
         """The orbit over one period; if it jumps at its point, from just after these jumps."""
-        start, end = self._first_moment(solver), self.t0 + self.period
+        end = self.t0 + self.period
+        arc = self._run(self.x0, self.t0, end, self.mode, solver)
+        if arc.status.ok and not self._jumps_at_ends(arc, solver):
+            return arc
+        start = self._first_moment(solver)
         after = float(start.t[-1])
-        arc = self._run(start.x[-1], after, after + self.period, str(start.mode[-1]), solver)
+        later = self._run(start.x[-1], after, after + self.period, str(start.mode[-1]), solver)
         # Rounding may put a jump at the point to either side of the end.
-        jumps = len(start.jumps) > 0 or bool(np.any(np.abs(arc.jumps.t - end) <= after - self.t0))
-        return arc if jumps and start.status.ok else self._run(self.x0, self.t0, end, self.mode, solver)
+        jumps = len(start.jumps) > 0 or bool(np.any(np.abs(later.jumps.t - end) <= after - self.t0))
+        return later if jumps and start.status.ok else arc
+
+    def _jumps_at_ends(self, arc: HybridArc, solver: Solver | None) -> bool:
+        """Whether a run around jumps at its start or at its end, or would a moment later."""
+        away = np.minimum(arc.jumps.t - self.t0, self.t0 + self.period - arc.jumps.t)
+        if np.any(away <= self.moment):
+            return True
+        end = float(arc.t[-1])
+        return len(self._run(arc.x[-1], end, end + self.moment, str(arc.mode[-1]), solver).jumps) > 0
 
     @property
     def moment(self) -> float:
