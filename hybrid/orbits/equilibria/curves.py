@@ -357,7 +357,9 @@ def _named(kind: str, spot: Spot) -> str | None:
         matrix = part.equations.within(u)
         sizes = np.sort(np.abs(eigenvalues_of(matrix)))
         largest = float(np.abs(eigenvalues_of(np.abs(matrix))).max())
-        return "Bogdanov-Takens" if len(sizes) > 1 and sizes[1] <= DOUBLE * largest else "cusp"
+        # A matrix whose powers vanish has no eigenvalues to measure by.
+        zero = max(DOUBLE * largest, np.finfo(float).eps * float(np.linalg.norm(matrix)))
+        return "Bogdanov-Takens" if len(sizes) > 1 and sizes[1] <= zero else "cusp"
     if kind == "boundary-Hopf":
         own = eigenvalues_of(part.equations.within(u))
         pair = own[np.argmin(np.abs(own.real))]
