@@ -13,7 +13,8 @@ import numpy as np
 
 from hybrid.kernels.types import codes
 from hybrid.orbits.continuation.family import Family, no_time
-from hybrid.orbits.continuation.passing import Flow, Pass
+from hybrid.orbits.continuation.flow import Flow
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.route import Loop, Stretch
 from hybrid.orbits.factors import MOST_ATTEMPTS, OTHER_UNITS, Products, suited
 from hybrid.orbits.periodic_schur import ProductEigenvalues, product_eigenvalues

@@ -10,8 +10,8 @@ import numpy as np
 
 # The unknowns are polynomials of a function through places at these shares of the bracket around its zero.
 SHARES = (-1.0, -0.6, -0.25, 0.25, 0.6, 1.0)
-# A zero is interpolated from the two ends of its bracket and so many places more, and is found when the next
-# place would be this near to one of them.
+# A zero is interpolated from the two ends of its bracket and so many places more, the last of which is this
+# near to the one before.
 MOST_PLACES = 6
 SAME = 1e-13
 
@@ -48,8 +48,7 @@ def zero_on_the_way(
 def _by_interpolation(value: Callable[[float], float], low: float, high: float) -> float | None:
     """The zero of a function that is nearly a line: the argument as a polynomial of the value, at zero.
 
-    None where that leaves the bracket or does not settle. A place beside the zero is as good as the zero if
-    the next one would be the same to rounding.
+    None where that leaves the bracket or does not settle.
     """
     lengths, heights = [low, high], [value(low), value(high)]
     if not heights[0] * heights[1] < 0.0:
@@ -60,11 +59,10 @@ def _by_interpolation(value: Callable[[float], float], low: float, high: float) 
         s = at_zero(np.array(heights), np.array(lengths)[:, None]).item()
         if not low < s < high:
             return None
-        if min(abs(s - each) for each in lengths) <= SAME:
-            return s
+        near = min(abs(s - each) for each in lengths)
         lengths.append(s)
         heights.append(value(s))
-        if heights[-1] == 0.0:
+        if heights[-1] == 0.0 or near <= SAME:
             return s
     return None
 

@@ -20,6 +20,8 @@ PLACES = 129
 SAME = 0.1
 # A guard that is zero at an end of a stretch by its nature has this share of its size there.
 NOTHING = 1e-9
+# An extremum is enclosed by so many places, and again between those beside it: then it is a parabola's.
+NARROWING = (33, 17, 17, 17)
 # Kinds of clearances whose places may move along a stretch.
 MOVING = ("top", "when")
 # Shares by which a stretch is looked at beyond an end where it goes on smoothly.
@@ -212,30 +214,33 @@ def top(key: Key, orbit: Pass) -> float:
 
 def extremum(key: Key, orbit: Pass) -> tuple[float, float]:
     """Where in its stretch a guard has an extremum near a share, and its height; nan if there is none."""
-    from scipy.optimize import minimize_scalar
-
+    found = np.nan, np.nan
     transition = _transition(orbit, key)
     i = key.stretch
     low = -2 * BESIDE if orbit.landings[i - 1] is None else 0.0
     high = 1.0 + 2 * BESIDE if orbit.landings[i] is None else 1.0
-    near = np.linspace(max(low, key.share - SAME), min(high, key.share + SAME), 33)
-    heights = heights_of(orbit, key.stretch, transition, near)
-    if heights is None:
-        return np.nan, np.nan
-    steps = np.diff(heights)
-    turns = np.flatnonzero(steps[:-1] * steps[1:] < 0.0) + 1
-    if len(turns) == 0:
-        return np.nan, np.nan
-    j = int(turns[np.argmin(np.abs(near[turns] - key.share))])
-    sign = -1.0 if heights[j] > heights[j - 1] else 1.0
+    low, high, near = max(low, key.share - SAME), min(high, key.share + SAME), key.share
+    for places in NARROWING:
+        shares = np.linspace(low, high, places)
+        heights = heights_of(orbit, i, transition, shares)
+        if heights is None:
+            return np.nan, np.nan
+        steps = np.diff(heights)
+        turns = np.flatnonzero(steps[:-1] * steps[1:] < 0.0) + 1
+        if len(turns) == 0:
+            # Rounding is all that is left, or there is none at first.
+            break
+        j = int(turns[np.argmin(np.abs(shares[turns] - near))])
+        low, near, high = shares[j - 1 : j + 2].tolist()
+        found = _vertex(shares[j - 1 : j + 2], heights[j - 1 : j + 2])
+    return found
 
-    def height(share: float) -> float:
-        found = heights_of(orbit, key.stretch, transition, np.array([share]))
-        return np.nan if found is None else sign * float(found[0])
 
-    # Brent's method finds the place to the square root of rounding, and the height to rounding.
-    best = minimize_scalar(height, bracket=(near[j - 1], near[j], near[j + 1]), tol=1e-9)
-    return float(best.x), sign * float(best.fun)
+def _vertex(shares: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
+    """The vertex of the parabola through three points at equal distances."""
+    one, other = np.diff(heights)
+    late = 0.5 * (one + other) / (one - other)
+    return float(shares[1] + late * (shares[1] - shares[0])), float(heights[1] + 0.25 * late * (one + other))
 
 
 def clearance_of(key: Key) -> Callable[[Pass], float]:

@@ -12,13 +12,15 @@ import numpy as np
 
 from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError
-from hybrid.orbits.continuation.passing import CLOSED, Flow, Landing, Pass
+from hybrid.orbits.continuation.flow import Flow, Landing
+from hybrid.orbits.continuation.passing import CLOSED, Pass
 from hybrid.orbits.continuation.route import Loop, Route, Stretch
 from hybrid.orbits.held import Held
 from hybrid.simulation.repeated import Repeated
 from hybrid.solvers import Solver
 from hybrid.system.functions import field_function, guard_function, reset_function
 from hybrid.system.graph import HybridSystem
+from hybrid.system.periodicity import period_at
 from hybrid.transform.extended import extended
 from hybrid.transform.restricted import BEYOND, ends_of, restricted
 
@@ -73,6 +75,8 @@ class Family:
     def _without_counters(self, slopes: np.ndarray) -> np.ndarray:
         """Derivatives ``(..., n + k + 1)`` in state, parameters and time, without the columns of counters."""
         last = self.n + len(self.names)
+        if slopes.shape[-1] == last + 1:
+            return slopes
         return np.delete(slopes, np.s_[last : slopes.shape[-1] - 1], axis=-1)
 
     @property
@@ -100,14 +104,23 @@ class Family:
 
     def vector(self, values: np.ndarray) -> np.ndarray:
         """All parameters ``(m,)`` of the original system."""
-        return self.system.parameter_values(self.all_parameters(values))
+        found = self._at_rest.copy()
+        found[self._places] = values
+        return found
+
+    @cached_property
+    def _at_rest(self) -> np.ndarray:
+        """All parameters, those that are free as the caller gave them."""
+        return self.system.parameter_values(self.parameters)
+
+    @cached_property
+    def _places(self) -> list[int]:
+        """Indices of the free parameters among all of them."""
+        return [list(self.system.parameters).index(name) for name in self.names]
 
     def period(self, values: np.ndarray) -> float:
         """The period of a forced orbit."""
-        if not callable(self.system.period):
-            assert self.system.period is not None
-            return self.periods * float(self.system.period)
-        forcing = self.system.forcing_period(self.all_parameters(values))
+        forcing = period_at(self.system.period, self.system.variables, self.vector(values))
         assert forcing is not None
         return self.periods * forcing
 
@@ -174,6 +187,7 @@ class Family:
         to, is another one. The passes take a few times the steps of the ``anchor`` at most.
         """
         predicted, before, most = loop.flat, np.inf, anchor.steps_allowed
+        open_before = np.inf
         for corrections in range(MOST_CORRECTIONS + 1):
             found = self.around(loop, most)
             if found is None:
@@ -186,16 +200,18 @@ class Family:
             change = _solved(matrix, right)
             if change is None or not np.all(np.isfinite(change)):
                 return None
-            length = float(np.abs(change).max())
+            length, still_open = float(np.abs(change).max()), float(np.abs(values).max())
             # Near a singular place rounding keeps the last steps from becoming smaller.
             small = length <= (CLOSED if corrections == MOST_CORRECTIONS else CONVERGED)
-            if small and np.all(np.abs(values) <= CLOSED):
+            # Errors may grow so much that a small step closes a large gap.
+            settled = still_open <= CONVERGED or still_open > CONTRACTION * open_before
+            if small and settled and still_open <= CLOSED:
                 return found, corrections
             loop = loop.plus(units * change)
             away = float(np.abs((loop.flat - predicted) / units).max())
             if length > 1.0 or away > reach or length > max(CONTRACTION * before, NEGLIGIBLE * reach):
                 return None
-            before = length
+            before, open_before = length, still_open
         return None
 
     def flow(

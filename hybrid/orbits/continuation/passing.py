@@ -8,6 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from hybrid.orbits.continuation.flow import Flow, Landing
 from hybrid.orbits.continuation.route import Loop
 from hybrid.orbits.periodic_schur import product_eigenvalues
 from hybrid.simulation.arc import HybridArc
@@ -24,74 +25,6 @@ MORE_STEPS = 10
 FEWEST_STEPS = 1000
 # Eigenvalues of one matrix are wrong by its norm times rounding; above this they come from its factors.
 BLURRED = 1e-9
-
-
-@attrs.frozen(eq=False)
-class Flow:
-    """One stretch of an orbit.
-
-    Attributes
-    ----------
-    arc
-        The run of the extended system, whose last components are the parameters; None if it takes no time.
-    end
-        State ``(n,)`` at the end, before the jump.
-    slopes
-        Derivatives ``(n, n + k)`` of that in the start and the parameters, at fixed times.
-    first_rate, last_rate
-        The field ``(n,)`` at the two ends.
-    counters
-        Values of the counters at the end: jumps that accumulate within the stretch may have counted.
-    """
-
-    arc: HybridArc | None
-    end: np.ndarray
-    slopes: np.ndarray
-    first_rate: np.ndarray
-    last_rate: np.ndarray
-    counters: tuple[float, ...] = ()
-
-    @property
-    def by_unknowns(self) -> np.ndarray:
-        """Derivatives ``(n, n + 2 + k)`` of the end in the start, in both times and in the parameters."""
-        n = len(self.end)
-        found = np.empty((n, self.slopes.shape[1] + 2))
-        found[:, :n], found[:, n + 2 :] = self.slopes[:, :n], self.slopes[:, n:]
-        found[:, n] = -self.slopes[:, :n] @ self.first_rate
-        found[:, n + 1] = self.last_rate
-        return found
-
-    def at(self, shares: np.ndarray) -> np.ndarray:
-        """States ``(N, n)`` at shares ``(N,)`` of the time."""
-        pieces = None if self.arc is None else self.arc._pieces
-        if pieces is None or not len(pieces.t):
-            return np.tile(self.end, (len(shares), 1))
-        begin, end = pieces.t[0], pieces.t[-1] + pieces.h[-1]
-        times = np.clip(begin + shares * (end - begin), begin, end)
-        states = pieces.at(times)[0][:, : len(self.end)]
-        states[shares >= 1.0] = self.end
-        return states
-
-
-@attrs.frozen(eq=False)
-class Landing:
-    """What the jumps at the end of a stretch do.
-
-    Attributes
-    ----------
-    after
-        State ``(n,)`` after them.
-    slopes
-        Derivatives ``(n, n + k + 1)`` of that in the state before, the parameters and the time.
-    height, gradient
-        The guard of the first of them, and its derivatives ``(n + k + 1,)`` in the same. The first sets off
-        all others.
-    """
-
-    after: np.ndarray
-    slopes: np.ndarray
-    height: float
-    gradient: np.ndarray
 
 
 @attrs.frozen(eq=False)
@@ -395,9 +328,22 @@ class Pass:
         jumps.
         """
         count, n = self.loop.x.shape
-        k = len(self.loop.values)
+        first = count * n
+        matrix, values = (each.copy() for each in self._stretch_by_stretch)
+        if self.departure is not None and anchor.departure is not None:
+            self._hold(*self.departure, anchor.departure[1][:, :n], anchor.scale, matrix, values)
+        self._close(anchor, matrix[-1], values, first)
+        matrix *= units
+        sizes = np.concatenate([np.tile(anchor.scale, count), np.abs(matrix[first:]).max(axis=1)])
+        sizes[sizes == 0.0] = 1.0
+        return matrix / sizes[:, None], values / sizes
+
+    @cached_property
+    def _stretch_by_stretch(self) -> tuple[np.ndarray, np.ndarray]:
+        """The equations without units and without the last one, which closes the orbit."""
+        count, n = self.loop.x.shape
         first, last = count * n, count * n + count + 1
-        matrix, values = np.zeros((last, last + k)), np.zeros(last)
+        matrix, values = np.zeros((last, last + len(self.loop.values))), np.zeros(last)
         for i, (flow, landing) in enumerate(zip(self.flows, self.landings, strict=True)):
             rows, own, times = slice(i * n, (i + 1) * n), first + i, slice(first + i, first + i + 2)
             reached = flow.by_unknowns
@@ -408,7 +354,11 @@ class Pass:
                 row = landing.gradient[:n] @ reached
                 row[n + 1] += landing.gradient[-1]
                 row[n + 2 :] += landing.gradient[n:-1]
-                matrix[own, rows], matrix[own, times], matrix[own, last:] = np.split(row, (n, n + 2))
+                matrix[own, rows], matrix[own, times], matrix[own, last:] = (
+                    row[:n],
+                    row[n : n + 2],
+                    row[n + 2 :],
+                )
                 values[own] = landing.height
                 reached = landing.slopes[:, :n] @ reached
                 reached[:, n + 1] += landing.slopes[:, -1]
@@ -422,13 +372,7 @@ class Pass:
         change = values[:first].reshape(count, n) - np.roll(self.loop.x, -1, axis=0)
         turns = self.family.system.turn_lengths[:n]
         values[:first] = (closed_change(change, turns) if turns.any() else change).ravel()
-        if self.departure is not None and anchor.departure is not None:
-            self._hold(*self.departure, anchor.departure[1][:, :n], anchor.scale, matrix, values)
-        self._close(anchor, matrix[-1], values, first)
-        matrix *= units
-        sizes = np.concatenate([np.tile(anchor.scale, count), np.abs(matrix[first:]).max(axis=1)])
-        sizes[sizes == 0.0] = 1.0
-        return matrix / sizes[:, None], values / sizes
+        return matrix, values
 
     def _join(self, i: int, row: np.ndarray, values: np.ndarray, first: int) -> None:
         """A stretch that goes on smoothly ends at its share of the time between two jumps."""
@@ -479,6 +423,8 @@ class Pass:
         """The last equation: the period is that of the forcing, or the time of the start is fixed."""
         loop, family, k = self.loop, self.family, len(self.loop.values)
         jumps = any(landing is not None for landing in self.landings)
+        if not jumps:
+            values[-2] = loop.times[0] - anchor.loop.times[0]
         if family.forced:
             row[-k - 1], row[first] = 1.0, -1.0
             row[-k:] = -family.slopes_of_period(loop.values)

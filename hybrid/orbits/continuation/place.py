@@ -28,6 +28,8 @@ LEAST_COSINE = 0.95
 SHORTEST_STEP = 1e-7
 # A run jumps where the equations say so if the times agree to this share of the period.
 SAME_TIME = 1e-6
+# A run that is compared with the equations goes on while errors have grown by this factor at most.
+LITTLE_GROWTH = 10.0
 # Stretches are divided anew if errors grow by this much more along one of them than they may.
 TOO_LARGE = 10.0
 # Two of these polynomials agree to this, in units of the unknowns.
@@ -108,7 +110,7 @@ class Place:
         reach = max(length / 2.0, SHORTEST_STEP)
         flat = self.orbit.loop.flat
         change = units * (lengths @ self.tangents)
-        if len(lengths) == 1:
+        if len(lengths) == 1 and self.firm:
             curved = interpolated(self._knots_for(length), float(lengths[0])) - flat
             # What the other places say is worth nothing where it is another way.
             change = curved if np.abs((curved - change) / units).max() <= reach else change
@@ -332,17 +334,17 @@ def slides(orbit: Pass, i: int) -> bool:
     name = next((fired[0] for fired in before if fired), None)
     if name is None:
         return False
-    # Half way through a short contact its guard stands still, too.
-    moments = (moment(orbit, i, share) for share in (0.25, 0.5, 0.75))
+    # Half way through a short contact its guard stands still, too. At the start most stretches tell.
+    moments = (moment(orbit, i, share) for share in (0.0, 0.25, 0.5, 0.75))
     return all(family.is_along(name, family.route[i].mode, *each, orbit.loop.values) for each in moments)
 
 
 def is_real(orbit: Pass) -> bool:
     """Whether the system itself goes this way.
 
-    Each guard fires in its direction, and runs from the middle of each stretch to that of the next one jump
-    as the equations say. A run does not begin or end on a surface that the motion stays on, in a chatter, or
-    between events that meet at one instant.
+    Each guard fires in its direction, and runs from the middle of one stretch to that of another jump as the
+    equations say. A run goes on over stretches along which errors hardly grow. It does not begin or end on a
+    surface that the motion stays on, in a chatter, or between events that meet at one instant.
     """
     route, stays = orbit.family.route, np.diff(orbit.loop.times)
     least = CLOSED * orbit.loop.period
@@ -350,7 +352,25 @@ def is_real(orbit: Pass) -> bool:
         return False
     lasting = [i for i, stretch in enumerate(route) if stays[i] > least and not stretch.within]
     free = [i for i in lasting if not slides(orbit, i)] or [0]
-    return all(_goes(orbit, i, after) for i, after in pairwise([*free, free[0] + len(route)]))
+    return all(_goes(orbit, i, after) for i, after in pairwise(_ends_of_runs(orbit, free)))
+
+
+def _ends_of_runs(orbit: Pass, free: list[int]) -> list[int]:
+    """Stretches among some from whose middles runs lead around; at last the first one, a period later."""
+    count, scale = len(orbit.flows), orbit.scale
+    ends, growing = [free[0]], np.eye(len(scale))
+    for begin, end in pairwise([*free, free[0] + count]):
+        across = np.eye(len(scale))
+        # Where a guard is touched errors grow without bound.
+        with np.errstate(all="ignore"):
+            for k in range(begin, end):
+                across = orbit.maps[k % count] / scale[:, None] * scale @ across
+            growing = across @ growing
+        if not np.linalg.norm(growing) <= LITTLE_GROWTH:
+            if begin != ends[-1]:
+                ends.append(begin)
+            growing = across
+    return [*ends, free[0] + count]
 
 
 def _goes(orbit: Pass, first: int, last: int) -> bool:

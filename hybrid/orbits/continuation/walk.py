@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Generator, Iterator
 
 import numpy as np
@@ -14,7 +13,6 @@ from hybrid.orbits.continuation.hopf import hopf_end
 from hybrid.orbits.continuation.instants import SAME, halves, passes_by
 from hybrid.orbits.continuation.monitors import Monitors
 from hybrid.orbits.continuation.place import (
-    LEAST_COSINE,
     SHORTEST_STEP,
     Place,
     at_value,
@@ -31,10 +29,9 @@ from hybrid.simulation.simulate import simulate
 # Lengths of steps along the branch, in units of the sizes of the orbit and of the range of the parameter.
 FIRST_STEP = 0.01
 LONGEST_STEP = 0.05
-# A step is lengthened after few corrections, as long as it is not to turn by more than this angle.
+# A step is lengthened after few corrections, but not after one that was too long.
 FEW_CORRECTIONS = 3
 LONGER = 1.5
-TURN = 0.8 * math.acos(LEAST_COSINE)
 # An orbit that is larger than the first one by this factor, the square root of rounding, grows without bound.
 UNBOUNDED = 2.0**26
 # Along the last part of a walk, of this length, the parameter stands still if it changes by this share of its
@@ -61,11 +58,11 @@ def walk(
     monitors.start(place)
     length, start, passed = FIRST_STEP, place, list[tuple[tuple[Route, ...], float]]()
     trace: list[tuple[float, float, float]] = []
-    curvature = 0.0
+    shortened = False
     for _ in range(most):
         made = place.step(np.array([length]))
         if made is None:
-            length /= 2.0
+            length, shortened = length / 2.0, True
             if length < SHORTEST_STEP:
                 yield "chatter" if _chatter_ends(place) else "lost"
                 return
@@ -100,7 +97,7 @@ def walk(
             if isinstance(onward, str):
                 yield onward
                 return
-            place, length, curvature = onward, min(length, FIRST_STEP), 0.0
+            place, length = onward, min(length, FIRST_STEP)
             yield place
             continue
         share = None if place is start else passes_by(start, place, after)
@@ -120,23 +117,11 @@ def walk(
         if why:
             yield why
             return
-        longer = LONGER if corrections <= FEW_CORRECTIONS else 1.0
-        before, curvature = curvature, _curvature(place, after)
-        length = min(LONGEST_STEP, longer * length, _turning_little(before, curvature))
+        if corrections <= FEW_CORRECTIONS and not shortened:
+            length = min(LONGEST_STEP, LONGER * length)
+        shortened = False
         place = refined(after)
     yield "most"
-
-
-def _curvature(place: Place, after: Place) -> float:
-    """By what angle the branch turns from one place to the next, per distance between them."""
-    turn = math.acos(min(1.0, float(after.tangents[0] @ place.tangents[0])))
-    return turn / max(distance(place, after), SHORTEST_STEP)
-
-
-def _turning_little(before: float, curvature: float) -> float:
-    """The length of a step that turns by no more than it may, if the curvature changes on as it did."""
-    growth = curvature / before if before > 0.0 else 1.0
-    return TURN / max(curvature * max(growth, 1.0), TURN)
 
 
 def _past(
@@ -152,7 +137,7 @@ def _past(
     """
     (low, high), last, beyond = span, change.place, change.onward.place
     near = SAME_CHANGE * float(place.sizes[0])
-    yield from _between(place, last, monitors, before=_just_before(place, last))
+    yield from _up_to(place, last, monitors)
     met = (change.routes, last.value)
     again = any(routes == met[0] and abs(value - met[1]) < near for routes, value in passed)
     if not again and change.alters:
@@ -216,20 +201,28 @@ def _to_the_edge(
         yield last
 
 
-def _just_before(place: Place, last: Place) -> Place:
-    """The place just before a change: at the change a guard may have no speed, and no test means anything."""
-    reach, slope = distance(place, last), abs(float(place.tangents[0, -1]))
-    made = place.towards(last).step(np.array([reach - min(SAME_CHANGE / max(slope, ROUNDING), SHY * reach)]))
-    return last if made is None else made[0]
+def _up_to(place: Place, last: Place, monitors: Monitors) -> list[Event]:
+    """What is met between a place and a change of the route, in order.
 
-
-def _between(place: Place, after: Place, monitors: Monitors, before: Place | None = None) -> list[Event]:
-    """The smooth bifurcations between two places and the zeros of other functions, in order.
-
-    The smooth ones are looked for up to another place ``before`` the second, if there is one.
+    At the change a guard may have no speed, and the tests mean nothing: smooth bifurcations are looked for up
+    to just before it. Where the parameter stands still there, that is no fold.
     """
-    found = [*_smooth(place, before or after), *monitors.between(place, after)]
-    return sorted(found, key=lambda each: distance(place, each.place))
+    reach, slope = distance(place, last), abs(float(place.tangents[0, -1]))
+    away = min(SAME_CHANGE / max(slope, ROUNDING), SHY * reach)
+    made = place.towards(last).step(np.array([reach - away]))
+    near = SAME_CHANGE * float(place.sizes[0])
+    smooth = _smooth(place, last if made is None else made[0])
+    found = [each for each in smooth if abs(each.place.value - last.value) > near]
+    return _in_order(place, [*found, *monitors.between(place, last)])
+
+
+def _between(place: Place, after: Place, monitors: Monitors) -> list[Event]:
+    """The smooth bifurcations between two places and the zeros of other functions, in order."""
+    return _in_order(place, [*_smooth(place, after), *monitors.between(place, after)])
+
+
+def _in_order(place: Place, events: list[Event]) -> list[Event]:
+    return sorted(events, key=lambda each: distance(place, each.place))
 
 
 def _smooth(place: Place, after: Place) -> Iterator[Event]:
