@@ -1,6 +1,7 @@
 """How long branches of orbits and curves of bifurcations take, and how far they are from closed forms.
 
-Seconds are processor time of one core, the least of three, with the model compiled before.
+Seconds are processor time of one core, the least of three, with the model compiled before. The runs of
+resonance curves with two measures are counted, and one of the short runs of a branch is timed by itself.
 """
 
 from __future__ import annotations
@@ -15,6 +16,12 @@ import numpy as np
 import models
 from benchmarks.common import heading, table
 from hybrid import PeriodicOrbit, continue_bifurcation, continue_orbit, periodic_orbit, simulate
+from hybrid.measures import amplitude, maximum
+from hybrid.simulation.repeated import Repeated
+from hybrid.simulation.trajectory import Common
+from hybrid.solvers import Taylor
+from hybrid.transform.extended import extended
+from hybrid.transform.restricted import restricted
 
 
 def settled(system: Any, x0: tuple[float, ...], periods: int, mode: str | None = None) -> PeriodicOrbit:
@@ -36,6 +43,58 @@ def timed(run: Callable[[], Any]) -> tuple[Any, float]:
         found = run()
         times.append(time.process_time() - start)
     return found, min(times)
+
+
+def runs_in(call: Callable[[], Any]) -> int:
+    """How many runs a call begins."""
+    begin, count = Common.begin, 0
+
+    def counted(*arguments: Any) -> Any:
+        nonlocal count
+        count += 1
+        return begin(*arguments)
+
+    Common.begin = counted  # type: ignore[method-assign]
+    try:
+        call()
+    finally:
+        Common.begin = begin  # type: ignore[method-assign]
+    return count
+
+
+def resonance_curves(bilinear: PeriodicOrbit, impacts: PeriodicOrbit) -> None:
+    gears = periodic_orbit(models.gear_pair(), (1.1, 0.0), parameters={"w": 1.6})
+    outputs = {"amplitude": amplitude("x"), "peak": maximum("x")}
+    rows = []
+    for what, orbit, span in (
+        ("gear pair", gears, (0.4, 1.6)),
+        ("bilinear oscillator", bilinear, (0.3, 4.0)),
+        ("impact oscillator", impacts, (0.75, 2.0)),
+    ):
+
+        def followed(orbit: PeriodicOrbit = orbit, span: tuple[float, float] = span) -> Any:
+            return continue_orbit(orbit, "w", span, outputs=outputs)
+
+        branch, seconds = timed(followed)
+        count = len(branch)
+        each = (f"{200 * seconds / count:.2f} s", f"{runs_in(followed) / count:.1f}")
+        rows.append((what, f"w {span[0]} to {span[1]}", str(count), str(len(branch.bifurcations)), *each))
+    table(("resonance curve", "over", "orbits", "bifurcations", "per 200 orbits", "runs per orbit"), rows)
+
+
+def short_runs() -> None:
+    system = extended(models.bilinear_oscillator(), ("w",))
+    flow, solver = restricted(system, "stiff"), Taylor(rtol=1e-12, atol=1e-14)
+    runs, start, times = Repeated(flow, {}, solver), np.array([0.0, 1.0, 1.0]), (0.0, 1.0)
+
+    def several(run: Callable[[], Any], number: int = 1000) -> float:
+        return 1e6 / number * timed(lambda: [run() for _ in range(number)])[1]
+
+    rows = [
+        ("simulate(tangent=True)", lambda: simulate(flow, start, times, solver=solver, tangent=True).status),
+        ("as a branch makes it", lambda: runs.run("stiff", start, times, 1000, 1000)),
+    ]
+    table(("one short run", "time"), [(what, f"{several(run):.0f} us") for what, run in rows])
 
 
 def main() -> None:
@@ -63,6 +122,9 @@ def main() -> None:
             (what, f"{name} {span[0]} to {span[1]}", str(len(branch)), f"{seconds:.2f} s", counted, error)
         )
     table(("branch", "over", "orbits", "time", "found", "error of the exact one"), rows)
+
+    resonance_curves(bilinear, impacts)
+    short_runs()
 
     found = continue_orbit(impacts, "w", (0.9, 2.0)).bifurcations
     curves = []
