@@ -124,10 +124,12 @@ class Curve:
                 return None
         across = slope / np.linalg.norm(slope)
         rate, shift, before, last = float(np.linalg.norm(slope)), 0.0, None, False
+        near = place
         for _ in range(MOST_CORRECTIONS):
-            made = place.step(lengths + shift * across)
+            made = near.step(lengths + shift * across)
             if made is None or last:
                 return None if made is None else made[0]
+            near = place.towards(made[0])
             height = self.test(made[0])
             if before is not None and shift != before[0] and height != before[1]:
                 rate = (height - before[1]) / (shift - before[0])

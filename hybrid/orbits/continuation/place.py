@@ -108,16 +108,13 @@ class Place:
         """The place at distances ``(k,)`` along the tangents, and how many corrections it took; or None."""
         units, length = self.units, float(np.abs(lengths).max())
         reach = max(length / 2.0, SHORTEST_STEP)
-        flat = self.orbit.loop.flat
-        change = units * (lengths @ self.tangents)
-        if len(lengths) == 1 and self.firm:
-            curved = interpolated(self._knots_for(length), float(lengths[0])) - flat
-            # What the other places say is worth nothing where it is another way.
-            change = curved if np.abs((curved - change) / units).max() <= reach else change
         try:
-            within = reach if self.firm else np.inf
             made = self.family.corrected(
-                self.orbit.loop.plus(change), self.orbit, units, self.tangents, within
+                self.orbit.loop.plus(self._guessed(lengths, reach)),
+                self.orbit,
+                units,
+                self.tangents,
+                reach if self.firm else np.inf,
             )
         except ArgumentError:
             return None
@@ -129,6 +126,21 @@ class Place:
         if len(lengths) == 1:
             found = attrs.evolve(found, path=(self.knot, *self.path[:1]))
         return found, made[1]
+
+    def _guessed(self, lengths: np.ndarray, reach: float) -> np.ndarray:
+        """The change of the unknowns that leads near the place at distances along the tangents."""
+        flat, units = self.orbit.loop.flat, self.units
+        straight = units * (lengths @ self.tangents)
+        if not self.path or not self.firm:
+            return straight
+        if len(lengths) == 1:
+            curved = interpolated(self._knots_for(abs(float(lengths[0]))), float(lengths[0])) - flat
+        else:
+            # On a surface a place beside the one that is looked for is as good as a polynomial.
+            known = self.path[0][0] - flat
+            curved = known + units * ((lengths - self.tangents @ (known / units)) @ self.tangents)
+        # What the other places say is worth nothing where it is another way.
+        return curved if np.abs((curved - straight) / units).max() <= reach else straight
 
     def _knots_for(self, length: float) -> list[tuple[float, np.ndarray, np.ndarray]]:
         """Distances along the tangent, unknowns and their slopes, here and where the path knows them.
