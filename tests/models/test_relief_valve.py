@@ -12,6 +12,7 @@ from hybrid import (
     simulate,
     switch_branch,
 )
+from hybrid.measures import minimum
 from models import relief_valve
 
 VALVE = relief_valve()
@@ -56,8 +57,7 @@ def test_small_cycles_grow_until_the_plate_touches_its_seat():
     cycles = continue_orbit(cycle, "q", (7.0, 9.0))
     grazing = next(each for each in cycles.bifurcations if each.kind == "grazing")
     assert grazing.value == pytest.approx(7.5572, abs=1e-4)
-    lowest = grazing.orbit.arc()["y"].min()
-    assert abs(lowest) < 1e-6
+    assert abs(minimum("y")(grazing.orbit.arc())) < 1e-6
 
 
 def test_the_valve_opens_when_the_pressure_has_reached_the_set_one():
