@@ -60,7 +60,9 @@ from hybrid.system.graph import HybridSystem
 from hybrid.system.laws import Laws
 from hybrid.system.repeat import repeat
 from hybrid.system.schedule import At
+from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.filippov import filippov
+from hybrid.transform.mechanics import mechanics
 from hybrid.transform.split import from_equations, split
 
 __version__ = "0.1.0"
@@ -80,6 +82,7 @@ __all__ = [
     "Branch",
     "CodimensionTwo",
     "CompiledSystem",
+    "Contact",
     "Delay",
     "Diagram",
     "EdgeState",
@@ -126,6 +129,7 @@ __all__ = [
     "filippov",
     "from_equations",
     "global_error",
+    "mechanics",
     "open_branch",
     "open_diagram",
     "open_end",

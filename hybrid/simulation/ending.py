@@ -100,6 +100,9 @@ class Ending:
         self._held = None
 
 
+NO_WAY_ON = "Change the parameters (less friction), or the start; the result holds everything up to that time."
+
+
 def has_tangents(trajectory: Trajectory) -> bool:
     """Whether the model of a run has tangent vectors everywhere."""
     return trajectory.compiled.is_smooth and not trajectory.system.switching
@@ -113,8 +116,7 @@ def _grow(trajectory: Trajectory, code: int) -> None:
     in_turn = code == StatusCode.ACCUMULATION and not run.at_rest
     for last in _recent(trajectory, run.round) if in_turn else [run.last_fired]:
         name = trajectory.system.transition_names[last]
-        if growth.leads_on(name):
-            growth.extend(name)
+        if growth.leads_on(name) and growth.extend(name, (trajectory.t, trajectory.x, trajectory.parameters)):
             raise Unexplored(name)
 
 
@@ -177,6 +179,10 @@ def _status(trajectory: Trajectory, code: int) -> Status:
         fired = _recent(trajectory, run.round)
         derived = all(_is_derived(trajectory, i) for i in fired)
         return chatter_status(where, [names[i] for i in fired], derived=derived)
+    if code == codes.TERMINAL and trajectory.system.growth is not None:
+        told = trajectory.system.growth.told.get(names[run.last_fired])
+        if told is not None:
+            return Status(StatusCode.TERMINAL, f"Ended by {names[run.last_fired]!r} {where}. {told}", NO_WAY_ON)
     full = _full(trajectory) if code == codes.NON_FINITE else None
     if full is not None:
         return full

@@ -77,7 +77,8 @@ def _refused(system: HybridSystem, run: Any, verdicts: list[int], allowed: list[
         # The state lies on surfaces; a mode along these may not have been made yet. The last is the nearest.
         for transition in reversed(_against(system, verdicts)):
             if system.growth.leads_on(transition.name):
-                system.growth.extend(transition.name)
+                place = float(run.phase), run.y[: system.dimension].copy(), model.parameters
+                system.growth.extend(transition.name, place)
                 raise Unexplored(transition.name)
     if not allowed:
         raise ArgumentError(

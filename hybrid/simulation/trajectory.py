@@ -68,7 +68,7 @@ def start(
     t0 = arguments.number(time, t0)
     mode = mode if by_guards else starting_mode(system, mode)
     if system.growth is not None:
-        explore(system, t0, state, system.parameter_values(parameters), mode)
+        mode = explore(system, t0, state, system.parameter_values(parameters), mode)
     whole, state, tangent = directed(system, state, tangent)
     common = Common(compile_system(whole), check_solver(solver), tangent, t0, time, horizon, stop)
 
@@ -98,15 +98,18 @@ def directed(
     return aged(system), with_age(system, state), tangent
 
 
-def explore(system: HybridSystem, t0: float, state: np.ndarray, values: np.ndarray, mode: str | None) -> None:
-    """Unexplored if modes of a growing system in which a run may start have been made only now."""
+def explore(
+    system: HybridSystem, t0: float, state: np.ndarray, values: np.ndarray, mode: str | None
+) -> str | None:
+    """The mode to start in; Unexplored if modes of a growing system have been made for it only now."""
     growth = system.growth
     if growth is None:
-        return
+        return mode
     # A run on a later stage of the system may have told the mode.
     later = mode not in system.mode_names and mode in growth.current.mode_names
     if later or growth.place(t0, state, values, mode):
         raise Unexplored(mode)
+    return growth.mode_at(t0, state, values, mode)
 
 
 @attrs.frozen(eq=False)

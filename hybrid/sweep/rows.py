@@ -116,7 +116,7 @@ class Rows:
         if len(state) < system.dimension:
             state = with_age(self.system, state)
         mode = starting_mode(system, mode)
-        explore(system, common.t0, state, values, mode)
+        mode = explore(system, common.t0, state, values, mode)
         return common.begin_at(state, mode, values)
 
     def values(self, point: Mapping[str, float]) -> np.ndarray:

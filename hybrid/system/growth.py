@@ -7,7 +7,7 @@ repeated with a larger system. Systems stay immutable: each is one stage of its 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
 
@@ -19,6 +19,10 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
+# Time, state and parameters.
+Place = tuple[float, np.ndarray, np.ndarray]
+
+
 class Growth(Protocol):
     """What makes further modes of a system.
 
@@ -28,10 +32,13 @@ class Growth(Protocol):
         The user's system.
     written
         What the compiler has made of the functions of earlier stages.
+    told
+        By transition: why a run ends there, in words.
     """
 
     original: Any
     written: dict[Any, Any]
+    told: Mapping[str, str]
 
     @property
     def current(self) -> Any:
@@ -42,12 +49,16 @@ class Growth(Protocol):
         """Whether a transition leads to a mode that the system lacks."""
         ...
 
-    def extend(self, transition: str) -> None:
-        """Make the mode to which a transition leads."""
+    def extend(self, transition: str, place: Place) -> bool:
+        """Make what follows a transition that has ended a run at a place; False if nothing does."""
         ...
 
     def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
         """Make the modes in which a run may start; whether there were any to be made."""
+        ...
+
+    def mode_at(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> str | None:
+        """The mode in which a run starts that is asked to start in ``mode``; None if the guards tell it."""
         ...
 
 

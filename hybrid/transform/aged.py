@@ -19,7 +19,7 @@ from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.entries import begins_age, check_ages, has_age
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem, watched_below
-from hybrid.system.growth import Growth
+from hybrid.system.growth import Growth, Place
 from hybrid.system.moving import moving_numbers
 from hybrid.system.portable import made_by
 from hybrid.system.variables import STATE, named_values
@@ -155,10 +155,20 @@ class _Growth:
         """Whether a transition leads to a mode that the system lacks."""
         return self.inner.leads_on(transition)
 
-    def extend(self, transition: str) -> None:
-        """Make the mode to which a transition leads."""
-        self.inner.extend(transition)
+    @property
+    def told(self) -> Mapping[str, str]:
+        """Why runs end, in words."""
+        return self.inner.told
+
+    def extend(self, transition: str, place: Place) -> bool:
+        """Make what follows a transition that has ended a run at a place."""
+        t, x, parameters = place
+        return self.inner.extend(transition, (t, without_age(self.inner.current, x), parameters))
 
     def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
         """Make the modes in which a run may start; whether there were any to be made."""
         return self.inner.place(t, without_age(self.inner.current, x), parameters, mode)
+
+    def mode_at(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> str | None:
+        """The mode in which a run starts."""
+        return self.inner.mode_at(t, without_age(self.inner.current, x), parameters, mode)

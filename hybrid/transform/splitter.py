@@ -26,6 +26,7 @@ from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.functions import field_function, moving_field
 from hybrid.system.graph import HybridSystem, watched_by
+from hybrid.system.growth import Place
 from hybrid.transform import corners, rests
 from hybrid.transform.cells import Cell, Choice, Pieces
 from hybrid.transform.edges import Edge, Outgoing
@@ -50,6 +51,7 @@ class Splitter:
         self.watched = watched_by(system)
         self.lock = RLock()
         self.written: dict[Any, Any] = {}
+        self.told: dict[str, str] = {}
         self.heights: dict[int, Function] = {}
         self.variables = system.variables
         self.symbols = model_symbols(system.dimension, len(system.parameters))
@@ -96,10 +98,11 @@ class Splitter:
         """Whether a transition, or the limit of its chatter, leads to a mode that the system lacks."""
         return transition in self.frontier
 
-    def extend(self, transition: str) -> None:
+    def extend(self, transition: str, place: Place) -> bool:
         """Make the mode to which a transition leads."""
         with self.lock:
             self._make([self.frontier[transition]], 1)
+        return True
 
     def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
         """Make the modes in which a run may start; whether there were any to be made."""
@@ -113,6 +116,10 @@ class Splitter:
             missing = [cell for cell in cells if cell not in self.made]
             self._make(missing, len(missing))
         return bool(missing)
+
+    def mode_at(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> str | None:
+        """The mode that a run is asked to start in: the guards tell which part it is."""
+        return mode
 
     def _values(self, t: float, x: np.ndarray, parameters: np.ndarray) -> dict[Symbol, float]:
         symbols = (self.symbols.t, *self.symbols.x, *self.symbols.p)

@@ -1,0 +1,1 @@
+"""Mechanical systems with unilateral contacts and dry friction, from gaps and masses."""

@@ -1,0 +1,121 @@
+"""A decision as conditions on the state at the event, and as the velocities after it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+import attrs
+import numpy as np
+
+from hybrid.expression.evaluation import Program
+from hybrid.expression.nodes import Expression, node
+from hybrid.expression.operations import Absolute, LessEqual, Not
+from hybrid.transform.contacts.decide import Decision, Judge
+from hybrid.transform.contacts.events import SETTLES, SUDDEN, Event
+from hybrid.transform.contacts.problem import NOISE, Case, Level, Outcome, matrix, outcome
+from hybrid.transform.contacts.statuses import OPEN, STICKS, Statuses
+
+
+@attrs.frozen(eq=False)
+class Written:
+    """A decision as expressions in the state at the event.
+
+    Attributes
+    ----------
+    conditions
+        What must hold for it.
+    velocities
+        The velocities after it; None if they stay.
+    """
+
+    conditions: list[Expression]
+    velocities: list[Expression] | None
+
+
+def written(
+    judge: Judge,
+    event: Event,
+    statuses: Statuses,
+    decision: Decision,
+    place: tuple[float, np.ndarray, np.ndarray],
+) -> Written:
+    """A decision at an event of a mode as expressions; ``place`` is ``(t, x, parameters)`` where it was made."""
+    mechanics, view = judge.mechanics, judge.mechanics.view
+    conditions: list[Expression] = []
+    if event.kind in SUDDEN:
+        conditions += _closed(judge, event, statuses, decision)
+    velocities: list[Expression] | None = None
+    numbers = mechanics.at(*place)
+    if decision.impulses is not None:
+        closed, settles = decision.closed, event.kind == SETTLES
+        level, in_numbers = (
+            mechanics.impacts(each, closed, [0.0 if settles else each.restitution[i] for i in closed])
+            for each in (view, numbers)
+        )
+        reached = _outcome(level, in_numbers, decision.impulses, range(len(closed)))
+        if not settles:
+            conditions += _consistent(reached)
+        conditions += _parted(level, reached, decision)
+        velocities = [
+            node(each) for each in view.moved(reached.forces, mechanics.rows_of(closed), view.velocities)
+        ]
+        t, x, parameters = place
+        after = Program(velocities).run(mechanics.space.values(t, x, parameters))
+        view = mechanics.with_velocities(velocities)
+        numbers = mechanics.at(t, np.array([*x[: len(after)], *after], dtype=float), parameters)
+    level, in_numbers = (mechanics.forces(each, decision.resting) for each in (view, numbers))
+    stuck = [k for k, sign in enumerate(decision.sliding) if sign == 0]
+    conditions += _consistent(_outcome(level, in_numbers, decision.forces, stuck))
+    return Written(conditions, velocities)
+
+
+def _outcome(level: Level, in_numbers: Level, case: Case, stuck: Sequence[int]) -> Outcome:
+    found = outcome(level, case, stuck, matrix(in_numbers, case))
+    assert found is not None, "only numbers can fail to determine forces"
+    return found
+
+
+def _consistent(reached: Outcome) -> list[Expression]:
+    """That a case is consistent."""
+    return [_not_negative(node(value), node(noise)) for value, noise in reached.conditions]
+
+
+def _closed(judge: Judge, event: Event, statuses: Statuses, decision: Decision) -> list[Expression]:
+    """That these gaps are closed, of those that the mode and the event do not close, and no others."""
+    found, view = [], judge.mechanics.view
+    for i, status in enumerate(statuses):
+        if status == OPEN and i != event.contact:
+            found.append(judge.is_near(event, view, i) if i in decision.closed else Not(judge.is_near(event, view, i)))
+    return found
+
+
+def _parted(level: Level, reached: Outcome, decision: Decision) -> list[Expression]:
+    """That contacts separate or do not, and slip or do not, after the impulses."""
+    case = decision.impulses
+    assert case is not None, "this is asked of impulses alone"
+    found = []
+    for k, i in enumerate(decision.closed):
+        row = level.row(k)
+        speed = node(reached.after[row])
+        if i not in decision.resting:
+            found.append(Not(_not_positive(speed, node(level.noise[row]))))
+            continue
+        if speed != 0:
+            found.append(_not_positive(speed, node(level.noise[row])))
+        if level.places[k][1] is None or case.statuses[k] == STICKS:
+            continue
+        row = level.across(k)
+        slip, noise = node(reached.after[row]), node(level.noise[row])
+        sign = decision.sliding[decision.resting.index(i)]
+        if sign == 0:
+            found += [_not_positive(slip, noise), _not_negative(slip, noise)]
+        else:
+            found.append(Not(_not_positive(sign * slip, noise)))
+    return found
+
+
+def _not_negative(value: Expression, noise: Expression) -> Expression:
+    return LessEqual(-NOISE * noise, value)
+
+
+def _not_positive(value: Expression, noise: Expression) -> Expression:
+    return LessEqual(value, NOISE * noise)

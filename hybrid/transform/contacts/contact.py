@@ -1,0 +1,115 @@
+"""A contact: a gap that cannot become negative, with restitution and dry friction."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import attrs
+
+from hybrid.errors import ModelError, shown
+from hybrid.system.elements import Function
+from hybrid.system.portable import Portable
+
+# A number, the name of a parameter, or a function of (t, x, p).
+Coefficient = float | str | Function
+MEANING = "be a number, the name of a parameter, or a function of (t, x, p)"
+
+
+@attrs.frozen
+class Contact(Portable):
+    """A unilateral contact between two bodies, or of a body with its surroundings.
+
+    The contact force enters the equations of motion as ``(d gap / d q) normal + (d slip / d velocities)
+    tangential``, with ``normal >= 0``; by Coulomb's law ``tangential`` opposes the slip, and
+    ``|tangential| <= friction normal``.
+
+    Parameters
+    ----------
+    name
+        Modes and outputs are named by it: ``left slips +``, ``left.normal``.
+    gap
+        ``g(t, x, p)``, positive in flight, of coordinates and time.
+    restitution
+        Coefficient ``e`` from 0 to 1: a number, the name of a parameter, or a function of ``(t, x, p)``, which
+        reads the state before the impact.
+    friction
+        Coefficient ``mu >= 0`` of kinetic friction, in the same three forms. It needs ``slip``.
+    slip
+        ``s(t, x, p)``, the relative tangential velocity; affine in the velocities.
+    static
+        Coefficient of static friction, no smaller than ``friction``, which it is if left out.
+
+    Raises
+    ------
+    ModelError
+        If a name is empty or has a comma or a plus sign, a function is not callable, a coefficient is out of
+        range, or there is friction without slip.
+
+    Examples
+    --------
+    >>> from hybrid import Contact
+    >>> floor = Contact("floor", gap=lambda t, x, p: x.y, restitution="e")
+    >>> floor.name
+    'floor'
+    """
+
+    name: str
+    gap: Function
+    restitution: Coefficient = attrs.field(default=0.0, kw_only=True)
+    friction: Coefficient = attrs.field(default=0.0, kw_only=True)
+    slip: Function | None = attrs.field(default=None, kw_only=True)
+    static: Coefficient | None = attrs.field(default=None, kw_only=True)
+
+    def __attrs_post_init__(self) -> None:
+        if not isinstance(self.name, str) or not self.name or any(each in self.name for each in ",+"):
+            raise ModelError(
+                f"Contact: name must be a non-empty text without ',' and '+', which join names in those of "
+                f"modes; got {shown(self.name)}."
+            )
+        for what in ("gap", "slip"):
+            function = getattr(self, what)
+            if not callable(function) and (what == "gap" or function is not None):
+                raise ModelError(
+                    f"{self.title}: {what} must be a function of (t, x, p); got {shown(function)}."
+                )
+        self._check("restitution", self.restitution, 1.0)
+        self._check("friction", self.friction, None)
+        if self.slip is None and (self.static is not None or not _is_zero(self.friction)):
+            raise ModelError(
+                f"{self.title}: friction needs slip=, the relative tangential velocity: a function of (t, x, p)."
+            )
+        if self.static is not None:
+            self._check("static", self.static, None)
+            if _are_numbers(self.static, self.friction) and self.static < self.friction:  # type: ignore[operator]
+                raise ModelError(
+                    f"{self.title}: static friction must be no smaller than friction = {self.friction}; got "
+                    f"{self.static}."
+                )
+
+    def _check(self, what: str, value: Any, most: float | None) -> None:
+        if callable(value) or (isinstance(value, str) and value):
+            return
+        number = value if isinstance(value, int | float) and not isinstance(value, bool) else None
+        if number is None:
+            raise ModelError(f"{self.title}: {what} must {MEANING}; got {shown(value)}.")
+        if not 0.0 <= number <= (number if most is None else most) or number == float("inf"):
+            allowed = "a finite number that is not negative" if most is None else "between 0 and 1"
+            raise ModelError(f"{self.title}: {what} must be {allowed}; got {shown(value)}.")
+
+    @property
+    def title(self) -> str:
+        """Beginning of error texts."""
+        return f"Contact {self.name!r}"
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether the contact can stick and slip."""
+        return self.slip is not None and not (_is_zero(self.friction) and self.static is None)
+
+
+def _is_zero(value: Any) -> bool:
+    return _are_numbers(value) and value == 0
+
+
+def _are_numbers(*values: Any) -> bool:
+    return all(isinstance(each, int | float) and not isinstance(each, bool) for each in values)

@@ -1,0 +1,353 @@
+"""A mechanical system that makes its modes and transitions as runs need them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property, reduce
+from itertools import chain, count
+from threading import RLock
+from typing import Any
+
+import attrs
+import numpy as np
+
+from hybrid.errors import ArgumentError
+from hybrid.expression.evaluation import Program, expressed, scalar
+from hybrid.expression.nodes import Expression, Number, add
+from hybrid.expression.operations import And, Not
+from hybrid.system.elements import Guard, Mode, Reset, Transition
+from hybrid.system.graph import HybridSystem
+from hybrid.system.outputs import Formula, Output
+from hybrid.transform.contacts.cases import Written, written
+from hybrid.transform.contacts.contact import Contact
+from hybrid.transform.contacts.decide import NONE, SEVERAL_CASES, Decision, Judge, Undecided
+from hybrid.transform.contacts.events import BREAKS, IMPACT, OPENS, SETTLES, STOPS, Event
+from hybrid.transform.contacts.modes import Held, held
+from hybrid.transform.contacts.statuses import (
+    IDLE,
+    OPEN,
+    SIGNS,
+    STICKS,
+    Statuses,
+    mode_name,
+    statuses_of,
+)
+from hybrid.transform.contacts.view import FORCES
+
+SETTLING = "settles"
+Place = tuple[float, np.ndarray, np.ndarray]
+# What holds at each contact, and whose friction each shares.
+Key = tuple[Statuses, tuple[int | None, ...]]
+
+
+@attrs.define(eq=False)
+class Watch:
+    """An event that a mode looks out for, and what may happen then.
+
+    Attributes
+    ----------
+    source, statuses
+        The mode, by its name and by what holds there.
+    event, guard
+        What is looked out for.
+    title
+        What happens, in names of transitions.
+    cases
+        The transitions that have been made, each with its condition.
+    undecided
+        Why a run has ended here.
+    decisions
+        What these transitions stand for.
+    """
+
+    source: str
+    statuses: Statuses
+    event: Event
+    guard: Guard
+    title: str
+    cases: list[tuple[Transition, Expression]] = attrs.field(factory=list)
+    undecided: Undecided | None = None
+    decisions: list[Decision] = attrs.field(factory=list)
+
+
+@attrs.frozen(eq=False)
+class Made:
+    """A mode that has been made."""
+
+    mode: Mode
+    forces: Held
+    watches: list[Watch]
+
+
+class ContactGrowth:
+    """Makes the modes of a mechanical system and the transitions between them, as runs need them."""
+
+    def __init__(self, judge: Judge, original: HybridSystem, called: Any = ()) -> None:
+        self.judge, self.original, self.called = judge, original, called
+        self.mechanics = judge.mechanics
+        self.written: dict[Any, Any] = {}
+        self.lock = RLock()
+        self.made: dict[Key, Made] = {}
+        self.stage: HybridSystem | None = None
+        self.frontier: dict[str, Watch] = {}
+        self.told: dict[str, str] = {}
+        self.notes: dict[str, None] = {}
+        self.names: dict[Any, str] = {}
+        count = len(self.mechanics.contacts)
+        self.settling = Watch(
+            SETTLING, (OPEN,) * count, Event(SETTLES), Guard(scalar(Number(1)), +1, at_start=True), "settle"
+        )
+        sample = self.original.variables
+        start = 0.0, np.ones(sample.dimension), sample.defaults
+        self._make(((OPEN,) * count, (None,) * count), start)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return self.called
+
+    @property
+    def contacts(self) -> list[Contact]:
+        """What the author gave."""
+        return [each.contact for each in self.mechanics.contacts]
+
+    @property
+    def current(self) -> HybridSystem:
+        """The system with all modes that have been made so far."""
+        with self.lock:
+            self.stage = self.stage or self._assembled()
+            return self.stage
+
+    def leads_on(self, transition: str) -> bool:
+        """Whether a transition stands for cases that have not been made."""
+        return transition in self.frontier
+
+    def extend(self, transition: str, place: Place) -> bool:
+        """Make what happens at the end of a run; False if nothing can: the run ends there."""
+        with self.lock:
+            watch = self.frontier[transition]
+            decision = self.judge.decide(watch.event, watch.statuses, *place)
+            if isinstance(decision, Undecided):
+                known = watch.undecided is not None and watch.undecided.name == decision.name
+                watch.undecided = decision
+                self.told[transition] = self._why(watch, decision)
+                self.stage = None if not known else self.stage
+                return not known
+            if decision in watch.decisions:
+                # It holds in numbers and not in the compiled code: all depends on rounding.
+                self.told[transition] = "What happens there depends on rounding."
+                return False
+            for each in self._alike(watch, decision):
+                self._write(each, decision, place)
+            self.stage = None
+            return True
+
+    def _alike(self, watch: Watch, decision: Decision) -> list[Watch]:
+        """The events that a decision is about: an impact of several contacts is one of each of them."""
+        if watch.event.kind != IMPACT:
+            return [watch]
+        made = next(each for each in self.made.values() if each.mode.name == watch.source)
+        return [
+            each
+            for each in made.watches
+            if each.event.kind == IMPACT and each.event.contact in decision.closed
+        ]
+
+    def _write(self, watch: Watch, decision: Decision, place: Place) -> None:
+        """Make the transition of a decision."""
+        watch.decisions.append(decision)
+        case = written(self.judge, watch.event, watch.statuses, decision, place)
+        velocities = case.velocities
+        if velocities is not None:
+            t, x, parameters = place
+            after = Program(velocities).run(self.mechanics.space.values(t, x, parameters))
+            place = t, np.array([*x[: len(after)], *after], dtype=float), parameters
+        self._add(watch, decision, case, self._make(decision.target(len(self.contacts)), place))
+
+    def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
+        """Make the mode in which a run starts; whether it was to be made."""
+        with self.lock:
+            before = len(self.made)
+            self._start(t, x, parameters, mode)
+            return len(self.made) > before
+
+    def mode_at(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> str:
+        """The mode in which a run starts.
+
+        Raises
+        ------
+        ArgumentError
+            If a gap is negative, or several things may happen.
+        """
+        with self.lock:
+            return self._start(t, x, parameters, mode)
+
+    def _start(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> str:
+        if mode == SETTLING:
+            return mode
+        if mode is not None:
+            known = next((each for each in self.made.values() if each.mode.name == mode), None)
+            if known is not None:
+                return mode
+            statuses = statuses_of(self.contacts, mode)
+            return self._make(self.judge.named(statuses, t, x, parameters), (t, x, parameters)).mode.name
+        decision = self.judge.start(t, x, parameters)
+        if isinstance(decision, Undecided):
+            if decision.name == SEVERAL_CASES:
+                raise ArgumentError(
+                    f"x0 = {tuple(map(float, x))} may go on in more than one mode: {self._cases(decision)}. "
+                    "Choose one with mode=."
+                )
+            return SETTLING
+        return self._make(decision.target(len(self.contacts)), (t, x, parameters)).mode.name
+
+    def _make(self, key: Key, place: Place) -> Made:
+        """The mode of some statuses."""
+        if key not in self.made:
+            name = mode_name(self.contacts, key[0])
+            taken = {each.mode.name for each in self.made.values()}
+            name = next(each for each in chain([name], (f"{name} ({k})" for k in count(2))) if each not in taken)
+            forces = held(self.mechanics, *key, place)
+            mode = Mode(name, forces.field)
+            self.made[key] = Made(mode, forces, [*self._watches(name, key, forces)])
+            if forces.undetermined:
+                self.notes[f"{name}: some contact forces are not determined there; the motion is."] = None
+            self.stage = None
+        return self.made[key]
+
+    def _watches(self, source: str, key: Key, forces: Held) -> Iterator[Watch]:
+        """What a mode looks out for."""
+        statuses, merged = key
+        view, gaps = self.mechanics.view, self._gaps
+        for i, (contact, status) in enumerate(zip(self.contacts, statuses, strict=True)):
+            name = contact.name
+
+            def watch(kind: str, guard: Guard, title: str, i: int = i) -> Watch:
+                return Watch(source, statuses, Event(kind, i), guard, title)
+
+            if status == OPEN:
+                yield watch(IMPACT, gaps[i], name)
+                continue
+            if status == IDLE:
+                continue
+            yield watch(OPENS, Guard(scalar(forces.normal[i]), -1), f"{name} opens")
+            row = self.mechanics.places[i][1]
+            if status == STICKS and merged[i] is None:
+                group = [j for j, by in enumerate(merged) if j == i or by == i]
+                most = add(*(view.static[j] * forces.normal[j] for j in group))
+                for sign in (1, -1):
+                    yield watch(BREAKS, Guard(scalar(most - sign * forces.tangential[i]), -1), f"{name} slips")
+            elif status in SIGNS:
+                assert row is not None, "a contact slips along a direction"
+                yield watch(STOPS, Guard(scalar(SIGNS[status] * view.speeds[row]), -1), f"{name} stops")
+
+    @cached_property
+    def _gaps(self) -> list[Guard]:
+        return [Guard(scalar(each), -1) for each in self.mechanics.view.gaps]
+
+    def _add(self, watch: Watch, decision: Decision, case: Written, target: Made) -> None:
+        """Make the transition of a case."""
+        condition: Expression = reduce(And, case.conditions) if case.conditions else Number(1)
+        asked = reduce(And, (Not(each) for _, each in watch.cases), condition)
+        reset = None
+        if case.velocities is not None:
+            reset = Reset(expressed([*self.mechanics.space.q, *case.velocities]))
+        several = [i for i in decision.closed if watch.statuses[i] == OPEN]
+        title = "+".join(self.contacts[i].name for i in several) if watch.event.kind == IMPACT else watch.title
+        to = target.mode.name
+        bounces = watch.event.kind == IMPACT and self.mechanics.contacts[watch.event.contact].restitution != 0
+        transition = Transition(
+            watch.source,
+            to,
+            attrs.evolve(watch.guard, when=None if asked == 1 else scalar(asked)),
+            reset,
+            accumulates_to=SETTLING if bounces else None,
+            name=self._unused(f"{watch.source}->{to} by {title}"),
+            part_of=title,
+        )
+        watch.cases.append((transition, condition))
+
+    def _unused(self, name: str) -> str:
+        used = {each.name for watch in self._all_watches() for each, _ in watch.cases}
+        return next(each for each in chain([name], (f"{name} ({k})" for k in count(2))) if each not in used)
+
+    def _all_watches(self) -> Iterator[Watch]:
+        yield self.settling
+        for each in self.made.values():
+            yield from each.watches
+
+    def _assembled(self) -> HybridSystem:
+        """The system of what has been made."""
+        transitions: list[Transition] = []
+        for watch in self._all_watches():
+            transitions += [each for each, _ in watch.cases]
+            onward = self._frontier(watch)
+            if onward is not None:
+                transitions.append(onward)
+        modes = [each.mode for each in self.made.values()]
+        settling = Mode(SETTLING, next(iter(self.made.values())).mode.field)
+        given: dict[str, Any] = {
+            "modes": [*modes, settling],
+            "transitions": transitions,
+            "outputs": {**self.original.outputs, **self._outputs()},
+            "notes": (*self.original.notes, *self.notes),
+            "growth": self,
+        }
+        return attrs.evolve(self.original, **given)
+
+    def _frontier(self, watch: Watch) -> Transition | None:
+        """The transition that ends a run where none of the cases that have been made holds."""
+        condition: Expression = reduce(And, (Not(each) for _, each in watch.cases), Number(1))
+        if condition == 0:
+            return None
+        part = watch.title if watch.undecided is None else watch.undecided.name
+        name = self._frontier_name(watch, part)
+        guard = attrs.evolve(watch.guard, when=None if condition == 1 else scalar(condition))
+        return Transition(watch.source, None, guard, name=name, part_of=part)
+
+    def _frontier_name(self, watch: Watch, part: str) -> str:
+        """A name that stays: a run in another thread may still be on an earlier stage."""
+        first = part if watch.undecided is not None else f"{watch.source}: {part}"
+        for name in chain([first], (f"{first} ({k})" for k in count(2))):
+            if self.frontier.setdefault(name, watch) is watch:
+                return name
+        raise AssertionError("names do not end")
+
+    def _outputs(self) -> dict[str, Output]:
+        """Gap and forces of each contact, in the modes that have been made."""
+        found = {}
+        modes = [(each.mode.name, each.forces) for each in self.made.values()]
+        for i, contact in enumerate(self.contacts):
+            for what in FORCES if contact.has_friction else FORCES[:1]:
+                name = f"{contact.name}.{what}"
+                formulas = [
+                    Formula(mode, scalar(getattr(forces, what)[i]))
+                    for mode, forces in modes
+                    if (i, what) not in forces.undetermined
+                ]
+                found[name] = Output(name, tuple(formulas))
+            gap = f"{contact.name}.gap"
+            found[gap] = Output(gap, (Formula(None, self._gaps[i].function),))
+        return found
+
+    def _why(self, watch: Watch, undecided: Undecided) -> str:
+        """Why a run ends where nothing is decided."""
+        names = ", ".join(repr(self.contacts[i].name) for i in undecided.contacts)
+        what = "impact" if undecided.sudden else "accelerations"
+        friction = ", ".join(
+            f"{self.contacts[i].name}: {self.contacts[i].friction}"
+            for i in undecided.contacts
+            if self.contacts[i].has_friction
+        )
+        text = f"contact {names} in mode {watch.source!r}" + (f", with friction {friction}" if friction else "")
+        if undecided.name == NONE:
+            return f"No {what} agree with Coulomb's law there (Painleve's paradox): {text}."
+        return f"Several {what} are consistent there: {text}; {self._cases(undecided)}."
+
+    def _cases(self, undecided: Undecided) -> str:
+        """What is consistent, as names of modes."""
+        names = []
+        for case in undecided.cases:
+            statuses = [OPEN] * len(self.contacts)
+            for i, status in zip(undecided.contacts, case, strict=True):
+                statuses[i] = status
+            names.append(repr(mode_name(self.contacts, tuple(statuses))))
+        return " or ".join(names)

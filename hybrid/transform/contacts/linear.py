@@ -1,0 +1,61 @@
+"""Linear equations between expressions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from hybrid.expression.nodes import ZERO, Expression, add, multiply, node
+
+Vector = list[Expression]
+
+
+def dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
+    """The sum of products, of numbers or of expressions, without those that are zero."""
+    terms = [x * y for x, y in zip(a, b, strict=True) if x != 0 and y != 0]
+    if any(isinstance(each, Expression) for each in terms):
+        return add(*map(node, terms))
+    return sum(terms[1:], terms[0]) if terms else 0.0
+
+
+def solved(rows: Sequence[Sequence[Expression]], columns: Sequence[Vector], values: np.ndarray) -> list[Vector]:
+    """The solutions ``X`` of ``A X = B``, by Gauss's elimination.
+
+    Parameters
+    ----------
+    rows
+        Those of ``A``.
+    columns
+        Those of ``B``.
+    values
+        ``A`` at a state: the largest values become pivots.
+    """
+    size = len(rows)
+    left = [[node(each) for each in row] for row in rows]
+    right = [[node(column[i]) for column in columns] for i in range(size)]
+    numbers = np.array(values, dtype=float)
+    waiting, pivots = [*range(size)], []
+    for k in range(size):
+        allowed = [i for i in waiting if left[i][k] is not ZERO]
+        pivot = max(allowed, key=lambda i, k=k: abs(numbers[i, k]))
+        waiting.remove(pivot)
+        pivots.append(pivot)
+        for i in waiting:
+            if left[i][k] is ZERO:
+                continue
+            share = left[i][k] / left[pivot][k]
+            numbers[i] -= numbers[pivot] * (numbers[i, k] / numbers[pivot, k])
+            for entries in (left, right):
+                entries[i] = [
+                    a if b is ZERO else a - multiply(share, b)
+                    for a, b in zip(entries[i], entries[pivot], strict=True)
+                ]
+    found: list[Vector] = [[ZERO] * size for _ in columns]
+    for k in reversed(range(size)):
+        row = pivots[k]
+        for column, solution in enumerate(found):
+            known = node(dot(left[row][k + 1 :], solution[k + 1 :]))
+            solution[k] = (right[row][column] - known) / left[row][k]
+    return found

@@ -1,0 +1,125 @@
+"""The mode in which contacts are held: its field, and the forces at the contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from hybrid.expression.evaluation import Program, expressed
+from hybrid.expression.nodes import ZERO, Expression, node
+from hybrid.system.elements import Function
+from hybrid.transform.contacts.equations import Space
+from hybrid.transform.contacts.problem import DEPENDENT, Case, Level, matrix, outcome
+from hybrid.transform.contacts.statuses import IDLE, OPEN, Statuses
+from hybrid.transform.contacts.view import FORCES, Mechanics, View
+
+# Of a difference that estimates a slope.
+STEP = 1e-6
+
+
+@attrs.frozen(eq=False)
+class Held:
+    """A mode by what holds at its contacts.
+
+    Attributes
+    ----------
+    field
+        ``f(t, x, p)``.
+    normal, tangential
+        By contact: the forces, by one choice where several would do.
+    undetermined
+        Names ``(contact, "normal")`` of those.
+    """
+
+    field: Function
+    normal: list[Expression]
+    tangential: list[Expression]
+    undetermined: frozenset[tuple[int, str]] = frozenset()
+
+
+def held(
+    mechanics: Mechanics,
+    statuses: Statuses,
+    merged: tuple[int | None, ...],
+    place: tuple[float, np.ndarray, np.ndarray],
+) -> Held:
+    """The mode of some statuses; ``place`` is ``(t, x, parameters)`` where it is first entered.
+
+    Forces keep the rates of gaps, and of slips of contacts that stick, at zero. Rounding and the errors of the
+    solver would let these drift, so forces also pull them back at the pace ``k`` of the motion, which changes
+    nothing where they are zero: ``g'' = -2 k g' - k^2 g`` (Baumgarte).
+    """
+    space, view, count = mechanics.space, mechanics.view, len(statuses)
+    normal: list[Any] = [node(0.0)] * count
+    tangential: list[Any] = [node(0.0)] * count
+    closed = [i for i, each in enumerate(statuses) if each not in (OPEN, IDLE)]
+    if not closed:
+        return Held(expressed([*space.u, *map(node, view.free)]), normal, tangential)
+    shared = [None if merged[i] is None else closed.index(merged[i]) for i in closed]  # type: ignore[arg-type]
+    case = Case(tuple(statuses[i] for i in closed), tuple(shared), (False,) * len(closed))
+    exact, rows = mechanics.forces(view, closed), mechanics.rows_of(closed)
+    numbers = matrix(mechanics.forces(mechanics.at(*place), closed), case)
+    pace = _pace(space, view.moved(_forces(exact, case, numbers), rows, view.free), place)
+    level = attrs.evolve(
+        exact,
+        targets=[_gap_drawn_back(mechanics, i, pace) for i in closed],
+        stops=[_slip_drawn_back(mechanics, i, pace) for i in closed],
+    )
+    forces = _forces(level, case, numbers)
+    for k, i in enumerate(closed):
+        normal[i] = node(forces[level.row(k)])
+        if level.places[k][1] is not None:
+            tangential[i] = node(forces[level.across(k)])
+    unknown = {(i, each) for i in _undetermined(mechanics.at(*place), mechanics, statuses) for each in FORCES}
+    unknown |= {(i, "tangential") for pair in enumerate(merged) if pair[1] is not None for i in pair}
+    field = expressed([*space.u, *map(node, view.moved(forces, rows, view.free))])
+    return Held(field, normal, tangential, frozenset(unknown))
+
+
+def _forces(level: Level, case: Case, numbers: np.ndarray) -> list[Any]:
+    found = outcome(level, case, (), numbers)
+    assert found is not None, "only numbers can fail to determine forces"
+    return found.forces
+
+
+def _gap_drawn_back(mechanics: Mechanics, i: int, pace: float) -> Expression:
+    row = mechanics.places[i][0]
+    return -2.0 * pace * mechanics.view.speeds[row] - pace**2 * mechanics.view.gaps[i]
+
+
+def _slip_drawn_back(mechanics: Mechanics, i: int, pace: float) -> Expression:
+    row = mechanics.places[i][1]
+    return ZERO if row is None else -pace * mechanics.view.speeds[row]
+
+
+def _pace(
+    space: Space, accelerations: Sequence[Any], place: tuple[float, np.ndarray, np.ndarray]
+) -> float:
+    """How fast a motion changes: the largest eigenvalue of its linearisation, as a power of two."""
+    t, x, parameters = place
+    n = space.size
+    steps = STEP * np.maximum(np.abs(x), 1.0)
+    states = x + np.vstack([np.zeros(2 * n), np.diag(steps)])
+    with np.errstate(all="ignore"):
+        found = Program([*map(node, accelerations)]).run(space.values(t, states.T, parameters))
+    values = np.array([np.broadcast_to(each, len(states)) for each in found], dtype=float)
+    slopes = (values[:, 1:] - values[:, :1]) / steps
+    matrix = np.vstack([np.eye(n, 2 * n, n), slopes])
+    size = np.abs(np.linalg.eigvals(matrix)).max() if np.isfinite(matrix).all() else 0.0
+    return float(2.0 ** np.round(np.log2(size))) if size > STEP else 1.0
+
+
+def _undetermined(view: View, mechanics: Mechanics, statuses: Statuses) -> list[int]:
+    """The contacts whose normal forces are not determined: some could push instead of others."""
+    closed = [i for i, each in enumerate(statuses) if each != OPEN]
+    if IDLE not in statuses:
+        return []
+    rows = [mechanics.places[i][0] for i in closed]
+    G = np.array([[view.delassus[i][j] for j in rows] for i in rows], dtype=float)
+    sizes = np.sqrt(np.diag(G))
+    values, vectors = np.linalg.eigh(G / np.outer(sizes, sizes))
+    free = np.abs(vectors[:, values <= DEPENDENT]).max(axis=1)
+    return [i for i, share in zip(closed, free, strict=True) if share > STEP]

@@ -1,0 +1,211 @@
+"""The complementarity problem of closed contacts, at the level of velocities or of accelerations.
+
+Both levels are alike. A contact has a normal speed (or acceleration) ``v`` and, with friction, a tangential
+one; forces (impulses) ``f`` at the contacts change them by ``G f``, where ``G = W M^-1 W^T`` (Delassus). One case
+says what holds at each contact, so its forces solve linear equations; it is consistent if certain quantities
+are not negative. The same text computes with numbers, to find the consistent cases, and with expressions, to
+write a case into a transition.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from hybrid.transform.contacts.linear import dot, solved
+from hybrid.transform.contacts.statuses import IDLE, OPEN, SIGNS, STICKS, Statuses
+
+# What is smaller than this share of its terms is zero: it has been computed with rounding.
+NOISE = 1e-9
+# Rows of a smaller singular value, relative to the largest, depend on each other.
+DEPENDENT = 1e-9
+
+
+@attrs.frozen
+class Case:
+    """What holds at each contact.
+
+    Attributes
+    ----------
+    statuses
+        One for each contact.
+    merged
+        By contact: the contact that takes up the friction of this one too, as one of the two decides nothing
+        that the other does not, like the feet of a block that lies flat.
+    lifts
+        By contact: whether it opens under the normal impulse that it is given, instead of needing more.
+    """
+
+    statuses: Statuses
+    merged: tuple[int | None, ...]
+    lifts: tuple[bool, ...]
+
+    def sticks(self, i: int) -> bool:
+        """Whether a contact has a friction force of its own that keeps it from slipping."""
+        return self.statuses[i] == STICKS and self.merged[i] is None
+
+    def is_held(self, i: int) -> bool:
+        """Whether a contact needs a normal force that equations tell."""
+        return self.statuses[i] not in (OPEN, IDLE) and not self.lifts[i]
+
+
+@attrs.frozen(eq=False)
+class Level:
+    """What a case is solved with: numbers, or expressions.
+
+    Attributes
+    ----------
+    places
+        By contact: where its normal and its tangential direction stand among the rows; None without friction.
+    delassus
+        The entries of ``G`` by rows.
+    before
+        The speeds, or the accelerations without forces, by rows.
+    targets
+        By contact: the least normal speed after an impact, or acceleration.
+    stops
+        By contact: the tangential speed, or acceleration, of one that sticks.
+    noise
+        What counts as zero, by rows.
+    given
+        By contact: a normal impulse that is there already.
+    friction, static
+        By contact.
+    """
+
+    places: Sequence[tuple[int, int | None]]
+    delassus: Sequence[Sequence[Any]]
+    before: Sequence[Any]
+    targets: Sequence[Any]
+    stops: Sequence[Any]
+    noise: Sequence[Any]
+    given: Sequence[Any]
+    friction: Sequence[Any]
+    static: Sequence[Any]
+
+    def row(self, i: int) -> int:
+        """The row of a normal direction."""
+        return self.places[i][0]
+
+    def across(self, i: int) -> int:
+        """The row of a tangential direction."""
+        row = self.places[i][1]
+        assert row is not None, "only a contact with friction sticks or slips"
+        return row
+
+
+@attrs.frozen(eq=False)
+class Outcome:
+    """What a case leads to.
+
+    Attributes
+    ----------
+    forces, after
+        By rows: forces or impulses; speeds or accelerations.
+    conditions
+        Pairs ``(value, noise)``: the case is consistent if no value is negative by more than its noise.
+    """
+
+    forces: list[Any]
+    after: list[Any]
+    conditions: list[tuple[Any, Any]]
+
+
+def outcome(
+    level: Level, case: Case, stuck: Sequence[int], numbers: np.ndarray | None = None
+) -> Outcome | None:
+    """What a case leads to; None if it does not determine its forces.
+
+    Parameters
+    ----------
+    stuck
+        Contacts that do not slip before: where they slip then, it is in the direction of their acceleration.
+    numbers
+        The matrix of the equations at a state, from `matrix`, if the level has expressions.
+    """
+    unknowns, start, wanted = _equations(level, case)
+    rows = [[dot(level.delassus[row], column) for column in unknowns] for row, _ in wanted]
+    right = [target - level.before[row] - dot(level.delassus[row], start) for row, target in wanted]
+    solution = solved_in_numbers(rows, right) if numbers is None else solved(rows, [right], numbers)[0]
+    if solution is None:
+        return None
+    forces = [
+        first + dot([column[row] for column in unknowns], solution) for row, first in enumerate(start)
+    ]
+    after = [speed + dot(row, forces) for speed, row in zip(level.before, level.delassus, strict=True)]
+    for row, target in wanted:
+        after[row] = target
+    return Outcome(forces, after, [*_conditions(level, case, stuck, forces, after)])
+
+
+def matrix(level: Level, case: Case) -> np.ndarray:
+    """The matrix of the equations of a case, in numbers."""
+    unknowns, _, wanted = _equations(level, case)
+    return np.array([[dot(level.delassus[row], column) for column in unknowns] for row, _ in wanted])
+
+
+def _equations(level: Level, case: Case) -> tuple[list[list[Any]], list[Any], list[tuple[int, Any]]]:
+    """Forces by rows for a unit of each unknown, and without any; the rows that have a target, with it."""
+    size = len(level.before)
+    unknowns, start, wanted = [], [0.0] * size, []
+    for i, status in enumerate(case.statuses):
+        across = -SIGNS[status] * level.friction[i] if status in SIGNS else 0.0
+        if case.is_held(i):
+            column = [0.0] * size
+            column[level.row(i)] = 1.0
+            if status in SIGNS:
+                column[level.across(i)] = across
+            unknowns.append(column)
+            wanted.append((level.row(i), level.targets[i]))
+        start[level.row(i)] = level.given[i]
+        if status in SIGNS:
+            start[level.across(i)] = across * level.given[i]
+        if case.sticks(i):
+            column = [0.0] * size
+            column[level.across(i)] = 1.0
+            unknowns.append(column)
+            wanted.append((level.across(i), level.stops[i]))
+    return unknowns, start, wanted
+
+
+def solved_in_numbers(rows: list[list[float]], right: list[float]) -> list[float] | None:
+    """The solution of linear equations; None if they do not determine one."""
+    if not rows:
+        return []
+    A = np.array(rows, dtype=float)
+    sizes = np.sqrt(np.abs(np.diag(A)))
+    scaled = A / np.outer(sizes, sizes) if sizes.all() else A
+    singular = np.linalg.svd(scaled, compute_uv=False)
+    if not singular[-1] > DEPENDENT * singular[0]:
+        return None
+    return [float(each) for each in np.linalg.solve(A, np.array(right, dtype=float))]
+
+
+def _conditions(
+    level: Level, case: Case, stuck: Sequence[int], forces: list[Any], after: list[Any]
+) -> Iterator[tuple[Any, Any]]:
+    for i, status in enumerate(case.statuses):
+        row = level.row(i)
+        if status == IDLE:
+            # It stays closed, and pushes no one.
+            continue
+        if not case.is_held(i):
+            yield after[row] - level.targets[i], level.noise[row]
+        else:
+            yield (forces[row] - level.given[i]) * level.delassus[row][row], level.noise[row]
+        if case.sticks(i):
+            across = level.across(i)
+            group = [j for j, by in enumerate(case.merged) if j == i or by == i]
+            most = sum(level.static[j] * forces[level.row(j)] for j in group)
+            for side in (1, -1):
+                yield (most - side * forces[across]) * level.delassus[across][across], level.noise[across]
+        elif status in SIGNS and i in stuck:
+            yield SIGNS[status] * after[level.across(i)], level.noise[level.across(i)]
+
+
+def holds(conditions: Sequence[tuple[float, float]]) -> bool:
+    """Whether numbers are not negative by more than their noise."""
+    return all(value >= -NOISE * noise for value, noise in conditions)
