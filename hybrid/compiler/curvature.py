@@ -6,8 +6,8 @@ import math
 
 from hybrid.compiler.statements.code import Statement, at, put
 from hybrid.compiler.statements.values import assignments, unprintable
-from hybrid.expression.derivatives import close_gates, partial_derivatives
-from hybrid.expression.nodes import ONE, Expression, Symbol, add
+from hybrid.expression.derivatives import close_gates, directional
+from hybrid.expression.nodes import ONE, Expression, Symbol
 from hybrid.expression.tracing import Symbols
 
 # Not every guard has a compiled curvature; then kernels take a difference quotient.
@@ -20,13 +20,10 @@ def curvature(guard: Expression | None, is_affine: bool, symbols: Symbols) -> li
         return [put(at("out", 0), 0.0)]
     if guard is None:
         return UNKNOWN
-    vector = [*(Symbol(f"out[{i}]") for i in range(len(symbols.x))), ONE]
-
-    def along(expression: Expression) -> Expression:
-        [slopes] = partial_derivatives([expression], symbols.variables)
-        return add(*(own * slope for own, slope in zip(vector, slopes, strict=True)))
-
-    second = close_gates(along(along(guard)))
+    vector: dict[Symbol, Expression] = {each: Symbol(f"out[{i}]") for i, each in enumerate(symbols.x)}
+    vector[symbols.t] = ONE
+    [second] = directional(directional([guard], vector), vector)
+    second = close_gates(second)
     if unprintable([second]) is not None:
         return UNKNOWN
     return assignments([at("out", 0)], [second])

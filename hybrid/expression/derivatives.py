@@ -137,7 +137,7 @@ def _slope(node: Expression, place: int) -> Expression:
     return multiply(node, Log(base if positive else Select(Equal(base, ZERO), ONE, base)))
 
 
-def directional(expressions: Iterable[Expression], seeds: Mapping[Symbol, Symbol]) -> list[Expression]:
+def directional(expressions: Iterable[Expression], seeds: Mapping[Symbol, Expression]) -> list[Expression]:
     """Derivatives along a vector, with one seed per symbol; common factors stay together."""
     expressions = [*expressions]
     along: dict[Expression, Expression] = {}

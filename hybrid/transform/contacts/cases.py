@@ -7,8 +7,8 @@ import attrs
 import numpy as np
 
 from hybrid.expression.evaluation import Program
-from hybrid.expression.nodes import Expression, node
-from hybrid.expression.operations import Absolute, LessEqual, Not
+from hybrid.expression.nodes import ZERO, Expression, node
+from hybrid.expression.operations import Less, LessEqual, Not
 from hybrid.transform.contacts.decide import Decision, Judge
 from hybrid.transform.contacts.events import SETTLES, SUDDEN, Event
 from hybrid.transform.contacts.problem import NOISE, Case, Level, Outcome, matrix, outcome
@@ -42,13 +42,18 @@ def written(
     mechanics, view = judge.mechanics, judge.mechanics.view
     conditions: list[Expression] = []
     if event.kind in SUDDEN:
-        conditions += _closed(judge, event, statuses, decision)
+        conditions += [
+            *_closed(judge, event, statuses, decision),
+            *_approaching(judge, event, statuses, decision),
+        ]
     velocities: list[Expression] | None = None
     numbers = mechanics.at(*place)
     if decision.impulses is not None:
         closed, settles = decision.closed, event.kind == SETTLES
         level, in_numbers = (
-            mechanics.impacts(each, closed, [0.0 if settles else each.restitution[i] for i in closed])
+            mechanics.impacts(
+                each, closed, [each.restitution[i] if i in decision.approaching else 0.0 for i in closed]
+            )
             for each in (view, numbers)
         )
         reached = _outcome(level, in_numbers, decision.impulses, range(len(closed)))
@@ -85,6 +90,18 @@ def _closed(judge: Judge, event: Event, statuses: Statuses, decision: Decision) 
     for i, status in enumerate(statuses):
         if status == OPEN and i != event.contact:
             found.append(judge.is_near(event, view, i) if i in decision.closed else Not(judge.is_near(event, view, i)))
+    return found
+
+
+def _approaching(judge: Judge, event: Event, statuses: Statuses, decision: Decision) -> list[Expression]:
+    """That these contacts approach, of those that a mode and an event leave open, and no others."""
+    if event.kind == SETTLES:
+        return []
+    found = []
+    for i in decision.closed:
+        if statuses[i] == OPEN and i != event.contact:
+            moves_on = Less(judge.mechanics.view.speeds[judge.mechanics.places[i][0]], ZERO)
+            found.append(moves_on if i in decision.approaching else Not(moves_on))
     return found
 
 

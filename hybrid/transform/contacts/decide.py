@@ -115,6 +115,8 @@ class Decision:
     ----------
     closed
         The contacts whose gaps are closed.
+    approaching
+        Those of them that approach: they have restitution.
     impulses
         What holds at each of these while velocities change; None if they do not.
     resting
@@ -126,6 +128,7 @@ class Decision:
     """
 
     closed: tuple[int, ...]
+    approaching: tuple[int, ...]
     impulses: Case | None
     resting: tuple[int, ...]
     sliding: tuple[int, ...]
@@ -184,9 +187,10 @@ class Judge:
         """What happens at an event in a mode in which these statuses hold."""
         view = self.mechanics.at(t, x, parameters)
         closed = self.closed(event, statuses, view)
-        impulses = None
+        impulses, approaching = None, []
         if event.kind in SUDDEN:
-            restitution = [0.0 if event.kind == SETTLES else view.restitution[i] for i in closed]
+            approaching = self.approaching(event, statuses, closed, view)
+            restitution = [view.restitution[i] if i in approaching else 0.0 for i in closed]
             level = self.mechanics.impacts(view, closed, restitution)
             if event.kind == SETTLES:
                 impulses = stopped(level)
@@ -213,14 +217,14 @@ class Judge:
             sliding = [
                 0 if event.kind == STOPS and i == event.contact else SIGNS.get(statuses[i], 0) for i in closed
             ]
-        return self._rest(event, statuses, closed, impulses, moving, resting, sliding)
+        parts = tuple(closed), tuple(approaching), impulses
+        return self._rest(event, statuses, parts, moving, resting, sliding)
 
     def _rest(
         self,
         event: Event,
         statuses: Statuses,
-        closed: Sequence[int],
-        impulses: Case | None,
+        parts: tuple[Any, ...],
         view: View,
         resting: Sequence[int],
         sliding: Sequence[int],
@@ -234,7 +238,7 @@ class Judge:
         if len(kinds) != 1:
             return _undecided(resting, kinds, False)
         case = self._with_idle(level, found[0], resting)
-        return Decision(tuple(closed), impulses, tuple(resting), tuple(sliding), case)
+        return Decision(*parts, tuple(resting), tuple(sliding), case)
 
     def start(
         self, t: float, x: np.ndarray, parameters: np.ndarray
@@ -249,7 +253,7 @@ class Judge:
         ]
         sliding = [self._sliding(view, i) for i in resting]
         nothing = Event(SETTLES), (OPEN,) * len(rows)
-        return self._rest(*nothing, resting, None, view, resting, sliding)
+        return self._rest(*nothing, (tuple(resting), (), None), view, resting, sliding)
 
     def named(
         self, statuses: Statuses, t: float, x: np.ndarray, parameters: np.ndarray
@@ -270,6 +274,19 @@ class Judge:
             if status != OPEN or i == event.contact or near:
                 found.append(i)
         return found
+
+    def approaching(
+        self, event: Event, statuses: Statuses, closed: Sequence[int], view: View
+    ) -> list[int]:
+        """The closed contacts that approach, those of the event among them; none at the limit of chatter."""
+        if event.kind == SETTLES:
+            return []
+        rows = self.mechanics.places
+        return [
+            i
+            for i in closed
+            if i == event.contact or (statuses[i] == OPEN and view.speeds[rows[i][0]] < 0.0)
+        ]
 
     def is_near(self, event: Event, view: View, i: int) -> Any:
         """Whether a contact is closed at an event that changes velocities, in numbers or as an expression.

@@ -253,13 +253,12 @@ class ContactGrowth:
         several = [i for i in decision.closed if watch.statuses[i] == OPEN]
         title = "+".join(self.contacts[i].name for i in several) if watch.event.kind == IMPACT else watch.title
         to = target.mode.name
-        bounces = watch.event.kind == IMPACT and self.mechanics.contacts[watch.event.contact].restitution != 0
         transition = Transition(
             watch.source,
             to,
             attrs.evolve(watch.guard, when=None if asked == 1 else scalar(asked)),
             reset,
-            accumulates_to=SETTLING if bounces else None,
+            accumulates_to=SETTLING if watch.event.kind == IMPACT else None,
             name=self._unused(f"{watch.source}->{to} by {title}"),
             part_of=title,
         )

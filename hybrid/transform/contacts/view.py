@@ -175,7 +175,10 @@ class Mechanics:
         return [row for i in contacts for row in self.places[i] if row is not None]
 
     def impacts(self, view: View, contacts: Sequence[int], restitution: Sequence[Any]) -> Level:
-        """The problem of velocities of some contacts, with a coefficient of restitution for each."""
+        """The problem of velocities of some contacts, each with a coefficient of restitution.
+
+        It is zero for a contact that does not approach: its rate afterwards is not negative.
+        """
         speeds = [view.speeds[self.places[i][0]] for i in contacts]
         targets = [0.0 if e == 0 else -(e * speed) for e, speed in zip(restitution, speeds, strict=True)]
         return self._level(view, contacts, view.speeds, view.fast, targets)
