@@ -9,10 +9,11 @@ import numpy as np
 from hybrid.expression.evaluation import Program
 from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.expression.operations import Less, LessEqual, Not
-from hybrid.transform.contacts.decide import Decision, Judge
+from hybrid.transform.contacts.decide import Decision, Judge, stopped
 from hybrid.transform.contacts.events import SETTLES, SUDDEN, Event
 from hybrid.transform.contacts.problem import NOISE, Case, Level, Outcome, matrix, outcome
 from hybrid.transform.contacts.statuses import OPEN, STICKS, Statuses
+from hybrid.transform.contacts.view import View
 
 
 @attrs.frozen(eq=False)
@@ -23,12 +24,12 @@ class Written:
     ----------
     conditions
         What must hold for it.
-    velocities
-        The velocities after it; None if they stay.
+    state
+        The state after it; None if it stays.
     """
 
     conditions: list[Expression]
-    velocities: list[Expression] | None
+    state: list[Expression] | None
 
 
 def written(
@@ -46,7 +47,7 @@ def written(
             *_closed(judge, event, statuses, decision),
             *_approaching(judge, event, statuses, decision),
         ]
-    velocities: list[Expression] | None = None
+    state: list[Expression] | None = None
     numbers = mechanics.at(*place)
     if decision.impulses is not None:
         closed, settles = decision.closed, event.kind == SETTLES
@@ -60,17 +61,38 @@ def written(
         if not settles:
             conditions += _consistent(reached)
         conditions += _parted(level, reached, decision)
-        velocities = [
-            node(each) for each in view.moved(reached.forces, mechanics.rows_of(closed), view.velocities)
-        ]
+        velocities = view.moved(reached.forces, mechanics.rows_of(closed), view.velocities)
+        state = [*_closed_exactly(judge, decision, statuses, event, numbers), *map(node, velocities)]
         t, x, parameters = place
-        after = Program(velocities).run(mechanics.space.values(t, x, parameters))
-        view = mechanics.with_velocities(velocities)
-        numbers = mechanics.at(t, np.array([*x[: len(after)], *after], dtype=float), parameters)
+        x = np.array(Program(state).run(mechanics.space.values(t, x, parameters)), dtype=float)
+        view, numbers = mechanics.with_velocities(state[len(velocities) :]), mechanics.at(t, x, parameters)
     level, in_numbers = (mechanics.forces(each, decision.resting) for each in (view, numbers))
     stuck = [k for k, sign in enumerate(decision.sliding) if sign == 0]
     conditions += _consistent(_outcome(level, in_numbers, decision.forces, stuck))
-    return Written(conditions, velocities)
+    return Written(conditions, state)
+
+
+def _closed_exactly(
+    judge: Judge, decision: Decision, statuses: Statuses, event: Event, numbers: View
+) -> list[Expression]:
+    """The coordinates after an event: gaps that count as closed and stay so are closed, by the least move.
+
+    The move is the smallest in the metric of the masses.
+    """
+    mechanics = judge.mechanics
+    q: list[Expression] = [*mechanics.space.q]
+    if all(statuses[i] != OPEN or i == event.contact for i in decision.resting):
+        return q
+    view = mechanics.view
+    level, in_numbers = (
+        attrs.evolve(
+            mechanics.forces(each, decision.resting),
+            before=[mechanics.gap_of(each, row) for row in mechanics.rows_of(decision.resting)],
+        )
+        for each in (view, numbers)
+    )
+    reached = _outcome(level, in_numbers, stopped(in_numbers), ())
+    return [*map(node, view.moved(reached.forces, mechanics.rows_of(decision.resting), q))]
 
 
 def _outcome(level: Level, in_numbers: Level, case: Case, stuck: Sequence[int]) -> Outcome:

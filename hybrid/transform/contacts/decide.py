@@ -291,14 +291,15 @@ class Judge:
     def is_near(self, event: Event, view: View, i: int) -> Any:
         """Whether a contact is closed at an event that changes velocities, in numbers or as an expression.
 
-        At the limit of chatter one that moves is not: it would get further than gaps that count as closed.
+        At the limit of chatter one that moves is not: it would get further than gaps that count as closed, even
+        against the largest acceleration that the forces could give it.
         """
         near = _not_larger(_size(view.gaps[i]), self.together)
         if event.kind != SETTLES:
             return near
         row = self.mechanics.places[i][0]
         height = view.speeds[row] * view.speeds[row]
-        still = _not_larger(height, self.together * _size(view.accelerations[row]))
+        still = _not_larger(height, self.together * view.strong[row])
         return And(near, still) if isinstance(near, Expression) else near and still
 
     def contact(self, i: int) -> Contact:

@@ -155,11 +155,10 @@ class ContactGrowth:
         """Make the transition of a decision."""
         watch.decisions.append(decision)
         case = written(self.judge, watch.event, watch.statuses, decision, place)
-        velocities = case.velocities
-        if velocities is not None:
+        if case.state is not None:
             t, x, parameters = place
-            after = Program(velocities).run(self.mechanics.space.values(t, x, parameters))
-            place = t, np.array([*x[: len(after)], *after], dtype=float), parameters
+            after = Program(case.state).run(self.mechanics.space.values(t, x, parameters))
+            place = t, np.array(after, dtype=float), parameters
         self._add(watch, decision, case, self._make(decision.target(len(self.contacts)), place))
 
     def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
@@ -247,9 +246,7 @@ class ContactGrowth:
         """Make the transition of a case."""
         condition: Expression = reduce(And, case.conditions) if case.conditions else Number(1)
         asked = reduce(And, (Not(each) for _, each in watch.cases), condition)
-        reset = None
-        if case.velocities is not None:
-            reset = Reset(expressed([*self.mechanics.space.q, *case.velocities]))
+        reset = None if case.state is None else Reset(expressed(case.state))
         several = [i for i in decision.closed if watch.statuses[i] == OPEN]
         title = "+".join(self.contacts[i].name for i in several) if watch.event.kind == IMPACT else watch.title
         to = target.mode.name

@@ -174,6 +174,10 @@ class Mechanics:
         """The rows of some contacts."""
         return [row for i in contacts for row in self.places[i] if row is not None]
 
+    def gap_of(self, view: View, row: int) -> Any:
+        """The gap of a normal direction; zero for a tangential one."""
+        return next((view.gaps[i] for i, (own, _) in enumerate(self.places) if own == row), 0.0)
+
     def impacts(self, view: View, contacts: Sequence[int], restitution: Sequence[Any]) -> Level:
         """The problem of velocities of some contacts, each with a coefficient of restitution.
 
