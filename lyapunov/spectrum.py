@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import attrs
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import qr
 
 from hybrid import ArgumentError, HybridSystem, Status, arguments
 from hybrid.accuracy.averages import (
@@ -45,6 +46,9 @@ if TYPE_CHECKING:
 # Rounding of the time may be at most this share of an interval.
 FINEST_INTERVAL = 2.0**-10
 JUMPS_AND_STEPS = [COUNTERS.index("jumps"), COUNTERS.index("steps")]
+
+# A direction of which less than this share is left is one that the mode does not allow.
+LEAST_SHARE = 1e-8
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -280,10 +284,16 @@ def lyapunov_spectrum(
 
 
 def orthonormal_at_start(trajectory: Trajectory) -> None:
-    """Make the tangent vectors of a run orthonormal again where its mode takes the age from them."""
-    if trajectory.system.age is not None:
-        trajectory.replace_tangents(trajectory.tangent_matrix)
-        trajectory.replace_tangents(np.linalg.qr(trajectory.tangent_matrix)[0])
+    """Make the tangent vectors of a run orthonormal again where its mode has taken some directions from them.
+
+    If there are more vectors than directions, the last ones are zero: their exponents are minus infinity.
+    """
+    if trajectory.system.age is None and not trajectory.holds:
+        return
+    trajectory.replace_tangents(trajectory.tangent_matrix)
+    directions, sizes, _ = qr(trajectory.tangent_matrix, mode="economic", pivoting=True)
+    kept = np.abs(np.diag(sizes)) > LEAST_SHARE * np.abs(sizes[0, 0])
+    trajectory.replace_tangents(directions * kept)
 
 
 def interval_length(trajectory: Trajectory, interval: float | None, intervals: int) -> float:

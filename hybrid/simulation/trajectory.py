@@ -23,6 +23,7 @@ from hybrid.simulation.end import (
     put_memory,
     with_component,
 )
+from hybrid.simulation.holding import tangent_projection
 from hybrid.simulation.initial_mode import choose_mode
 from hybrid.simulation.interrupt import FIRST_BURST, Bursts
 from hybrid.simulation.memory import Memory, put_tangents
@@ -156,7 +157,10 @@ class Common:
             memory.begin(model, state, self.tangent, self.t0, self.horizon)
             choose_mode(compiled.system, plan, model, memory.run, memory.work, mode)
         memory.run.mode = index
-        return Trajectory(compiled, plan, model, memory, tangents, self._most, phase0, beyond, self.stop)
+        made = Trajectory(compiled, plan, model, memory, tangents, self._most, phase0, beyond, self.stop)
+        if self.tangent is not None and made.holds:
+            made.replace_tangents(self.tangent)
+        return made
 
     def go_on(self, end: ArcEnd, model_of: Callable[[Plan, Memory], Any]) -> Trajectory:
         """A trajectory that goes on from the end of a run."""
@@ -245,6 +249,11 @@ class Trajectory:
         return self.system.mode_names[self.run.mode]
 
     @property
+    def holds(self) -> bool:
+        """Whether the current mode holds quantities at zero."""
+        return self.system.modes[self.run.mode].holds is not None
+
+    @property
     def jumps(self) -> int:
         """Jumps so far."""
         return int(self.run.jumps) - self.first_jump
@@ -263,8 +272,13 @@ class Trajectory:
     def replace_tangents(self, matrix: np.ndarray) -> None:
         """Go on with other tangent vectors, the columns of ``(n, k)``.
 
-        Where the age of the mode counts for nothing, they have no part along it.
+        Where the age of the mode counts for nothing, they have no part along it. In a mode that holds
+        something they are projected onto the directions that it allows.
         """
+        if self.holds:
+            mode = self.system.modes[self.run.mode]
+            place = self.t, self.x, self.parameters
+            matrix = tangent_projection(mode, self.system.variables, *place) @ matrix
         if self.system.age is not None and not has_age(self.system, self.mode):
             matrix = matrix * (np.arange(len(matrix)) != self.system.age)[:, None]
         put_tangents(self.run.y, self.model.dimension, matrix)

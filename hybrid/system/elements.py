@@ -149,6 +149,10 @@ class Mode(Portable):
         Optional ``(t, x, p)`` function that returns the rows of ``D_x f``, one per value of the field, each
         of ``n`` values, a column for every component of ``x``, or of ``n + 1`` with ``D_t f`` last. Derived
         from ``field`` if omitted.
+    holds
+        Optional ``(t, x, p)`` function that returns what the mode keeps at zero, such as the length of a taut
+        rope less its own and the rate of it. Tangent vectors that begin in the mode are projected onto the
+        directions that it allows; the exponents and multipliers of the others are minus infinity and zero.
     part_of
         Name of the mode that this one is a part of, in a system that has been split; else None.
 
@@ -168,6 +172,7 @@ class Mode(Portable):
     name: str = attrs.field(validator=_nonempty_name)
     field: Function = attrs.field(validator=_callable)
     jacobian: Function | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
+    holds: Function | None = attrs.field(default=None, kw_only=True, validator=_optional_callable)
     part_of: str | None = attrs.field(default=None, kw_only=True, validator=_optional_name)
 
 

@@ -96,7 +96,8 @@ class _Aging:
     def _mode(self, mode: Mode) -> Mode:
         rates = self._function(mode.field)
         rest = (0.0,) * self.held + (float(has_age(self.original, mode.name)),)
-        return attrs.evolve(mode, field=lambda t, x, p: (*rates(t, x, p), *rest), jacobian=None)
+        holds = None if mode.holds is None else self._function(mode.holds)
+        return attrs.evolve(mode, field=lambda t, x, p: (*rates(t, x, p), *rest), jacobian=None, holds=holds)
 
     def _transition(self, transition: Transition) -> Transition:
         guard, age = transition.guard, self.age

@@ -205,7 +205,7 @@ class ContactGrowth:
             taken = {each.mode.name for each in self.made.values()}
             name = next(each for each in chain([name], (f"{name} ({k})" for k in count(2))) if each not in taken)
             forces = held(self.mechanics, *key, place)
-            mode = Mode(name, forces.field)
+            mode = Mode(name, forces.field, holds=forces.holds)
             self.made[key] = Made(mode, forces, [*self._watches(name, key, forces)])
             if forces.undetermined:
                 self.notes[f"{name}: some contact forces are not determined there; the motion is."] = None

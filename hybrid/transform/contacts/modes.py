@@ -28,6 +28,8 @@ class Held:
     ----------
     field
         ``f(t, x, p)``.
+    holds
+        What it keeps at zero: gaps, their rates, slips of what sticks; None without a closed contact.
     normal, tangential
         By contact: the forces, by one choice where several would do.
     undetermined
@@ -35,6 +37,7 @@ class Held:
     """
 
     field: Function
+    holds: Function | None
     normal: list[Expression]
     tangential: list[Expression]
     undetermined: frozenset[tuple[int, str]] = frozenset()
@@ -57,7 +60,7 @@ def held(
     tangential: list[Any] = [node(0.0)] * count
     closed = [i for i, each in enumerate(statuses) if each not in (OPEN, IDLE)]
     if not closed:
-        return Held(expressed([*space.u, *map(node, view.free)]), normal, tangential)
+        return Held(expressed([*space.u, *map(node, view.free)]), None, normal, tangential)
     shared = [None if merged[i] is None else closed.index(merged[i]) for i in closed]  # type: ignore[arg-type]
     case = Case(tuple(statuses[i] for i in closed), tuple(shared), (False,) * len(closed))
     exact, rows = mechanics.forces(view, closed), mechanics.rows_of(closed)
@@ -76,7 +79,9 @@ def held(
     unknown = {(i, each) for i in _undetermined(mechanics.at(*place), mechanics, statuses) for each in FORCES}
     unknown |= {(i, "tangential") for pair in enumerate(merged) if pair[1] is not None for i in pair}
     field = expressed([*space.u, *map(node, view.moved(forces, rows, view.free))])
-    return Held(field, normal, tangential, frozenset(unknown))
+    kept = [each for i in closed for each in (view.gaps[i], view.speeds[mechanics.places[i][0]])]
+    kept += [view.speeds[row] for k, i in enumerate(closed) if case.sticks(k) for row in mechanics.places[i][1:] if row]
+    return Held(field, expressed(kept), normal, tangential, frozenset(unknown))
 
 
 def _forces(level: Level, case: Case, numbers: np.ndarray) -> list[Any]:
