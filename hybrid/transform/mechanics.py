@@ -15,8 +15,6 @@ from hybrid.system.watched import Watched
 from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.contacts.statuses import FREE
 
-NEWTON, POISSON, SEQUENTIAL = "newton", "poisson", "sequential"
-
 
 def mechanics(
     *,
@@ -28,7 +26,7 @@ def mechanics(
     kinetic: Function | None = None,
     potential: Function | None = None,
     parameters: Mapping[str, float] | None = None,
-    impacts: str = NEWTON,
+    impacts: str = "newton",
     together: float = 1e-9,
     period: float | Function | None = None,
     name: str = "",
@@ -61,7 +59,8 @@ def mechanics(
         Default values by name.
     impacts
         ``"newton"``: each rate after an impact is at least ``-e`` times the rate before. ``"poisson"``: the
-        impulses of compression come back ``e``-fold.
+        impulses of compression come back ``e``-fold. ``"sequential"``: Newton's law for one contact after
+        another, in listed order, where several close together.
     together
         Gaps below this count as closed when another contact closes: they take part in its impact.
     period, name, start, units, angles, outputs, laws
@@ -110,7 +109,7 @@ def mechanics(
     """
     # SymPy is slow to import, so it is not imported with the library.
     from hybrid.expression.evaluation import expressed
-    from hybrid.transform.contacts.decide import Judge
+    from hybrid.transform.contacts.decide import LAWS, Judge
     from hybrid.transform.contacts.equations import Space, equations_of
     from hybrid.transform.contacts.growth import ContactGrowth
     from hybrid.transform.contacts.kinematics import kinematics_of
@@ -122,7 +121,7 @@ def mechanics(
             f"mechanics: velocities are the rates of coordinates, one for each; got {len(q)} coordinates and "
             f"{len(u)} velocities."
         )
-    arguments.one_of("mechanics: impacts", impacts, (NEWTON, POISSON, SEQUENTIAL))
+    arguments.one_of("mechanics: impacts", impacts, LAWS)
     touching = tuple(arguments.items("mechanics: contacts", contacts, "be a list of Contact objects", least=1))
     for i, each in enumerate(touching):
         arguments.instance(f"mechanics: contacts[{i}]", each, Contact)
@@ -130,7 +129,7 @@ def mechanics(
     space = Space(Variables((*q, *u), values))
     equations = equations_of(space, mass, forces, kinetic, potential)
     system = Mechanics(space, equations, tuple(kinematics_of(space, each) for each in touching))
-    judge = Judge(system, arguments.positive("mechanics: together", together))
+    judge = Judge(system, arguments.positive("mechanics: together", together), impacts)
     free = expressed([*space.u, *system.view.free])
     functions = [mass, forces, kinetic, potential]
     for each in touching:

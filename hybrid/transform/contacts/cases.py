@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 import attrs
 import numpy as np
 
 from hybrid.expression.evaluation import Program
 from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.expression.operations import Less, LessEqual, Not
-from hybrid.transform.contacts.decide import Decision, Judge, stopped
+from hybrid.transform.contacts.decide import Decision, Judge
 from hybrid.transform.contacts.events import SETTLES, SUDDEN, Event
 from hybrid.transform.contacts.problem import NOISE, Case, Level, Outcome, matrix, outcome
+from hybrid.transform.contacts.solutions import stopped
 from hybrid.transform.contacts.statuses import OPEN, STICKS, Statuses
 from hybrid.transform.contacts.view import View
 
@@ -49,19 +51,23 @@ def written(
         ]
     state: list[Expression] | None = None
     numbers = mechanics.at(*place)
-    if decision.impulses is not None:
-        closed, settles = decision.closed, event.kind == SETTLES
-        level, in_numbers = (
-            mechanics.impacts(
-                each, closed, [each.restitution[i] if i in decision.approaching else 0.0 for i in closed]
-            )
-            for each in (view, numbers)
-        )
-        reached = _outcome(level, in_numbers, decision.impulses, range(len(closed)))
-        if not settles:
-            conditions += _consistent(reached)
-        conditions += _parted(level, reached, decision)
-        velocities = view.moved(reached.forces, mechanics.rows_of(closed), view.velocities)
+    if decision.impulses:
+        closed, approaching = decision.closed, decision.approaching
+        levels = [judge.first_phase(each, closed, approaching) for each in (view, numbers)]
+        forces: list[Any] = [0.0] * len(levels[0].before)
+        for phase, case in enumerate(decision.impulses):
+            if phase:
+                pairs = zip((view, numbers), levels, ends, strict=True)
+                levels = [judge.next_phase(*each, closed, approaching) for each in pairs]
+            ends = [_outcome(*levels, case, range(len(closed))), _in_numbers(levels[1], case)]
+            forces = [a + b for a, b in zip(forces, ends[0].forces, strict=True)]
+            if event.kind != SETTLES:
+                conditions += _consistent(ends[0])
+        if event.kind == SETTLES:
+            conditions += _slid(judge, decision)
+        else:
+            conditions += _parted(levels[0], ends[0], decision)
+        velocities = view.moved(forces, mechanics.rows_of(closed), view.velocities)
         state = [*_closed_exactly(judge, decision, statuses, event, numbers), *map(node, velocities)]
         t, x, parameters = place
         x = np.array(Program(state).run(mechanics.space.values(t, x, parameters)), dtype=float)
@@ -91,13 +97,19 @@ def _closed_exactly(
         )
         for each in (view, numbers)
     )
-    reached = _outcome(level, in_numbers, stopped(in_numbers), ())
+    reached = _outcome(level, in_numbers, stopped(in_numbers, ()), ())
     return [*map(node, view.moved(reached.forces, mechanics.rows_of(decision.resting), q))]
 
 
 def _outcome(level: Level, in_numbers: Level, case: Case, stuck: Sequence[int]) -> Outcome:
     found = outcome(level, case, stuck, matrix(in_numbers, case))
     assert found is not None, "only numbers can fail to determine forces"
+    return found
+
+
+def _in_numbers(level: Level, case: Case) -> Outcome:
+    found = outcome(level, case, ())
+    assert found is not None, "the case was found in these numbers"
     return found
 
 
@@ -127,10 +139,20 @@ def _approaching(judge: Judge, event: Event, statuses: Statuses, decision: Decis
     return found
 
 
+def _slid(judge: Judge, decision: Decision) -> list[Expression]:
+    """That contacts slip or do not at the limit of chatter."""
+    found, view = [], judge.mechanics.view
+    for i, sign in zip(decision.resting, decision.sliding, strict=True):
+        row = judge.mechanics.places[i][1]
+        if row is not None:
+            still = judge.is_still(view, row)
+            found += [Not(still), Less(ZERO, sign * view.speeds[row])] if sign else [still]
+    return found
+
+
 def _parted(level: Level, reached: Outcome, decision: Decision) -> list[Expression]:
     """That contacts separate or do not, and slip or do not, after the impulses."""
-    case = decision.impulses
-    assert case is not None, "this is asked of impulses alone"
+    case = decision.impulses[-1]
     found = []
     for k, i in enumerate(decision.closed):
         row = level.row(k)

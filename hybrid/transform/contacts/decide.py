@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
 from typing import Any
 
 import attrs
 import numpy as np
 
-from hybrid.expression.nodes import Expression, node
+from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.expression.operations import Absolute, And, LessEqual
 from hybrid.transform.contacts.contact import Contact
-from hybrid.transform.contacts.events import BREAKS, SETTLES, STOPS, SUDDEN, Event
-from hybrid.transform.contacts.problem import DEPENDENT, NOISE, Case, Level, Outcome, holds, outcome
+from hybrid.transform.contacts.events import BREAKS, IMPACT, SETTLES, STOPS, SUDDEN, Event
+from hybrid.transform.contacts.problem import NOISE, Case, Level, Outcome, outcome
+from hybrid.transform.contacts.solutions import (
+    Found,
+    by_history,
+    consistent,
+    is_implied,
+    merged_in,
+    several,
+    stopped,
+)
 from hybrid.transform.contacts.statuses import (
-    HELD,
     IDLE,
     OPEN,
     SIGNS,
@@ -26,86 +33,6 @@ from hybrid.transform.contacts.statuses import (
     closed_statuses,
 )
 from hybrid.transform.contacts.view import Mechanics, View
-
-# Solutions whose speeds differ by more than this share of their terms are several.
-SEVERAL = 1e-6
-
-
-@attrs.frozen(eq=False)
-class Found:
-    """A consistent case and what it leads to."""
-
-    case: Case
-    outcome: Outcome
-
-
-def consistent(
-    level: Level, options: Sequence[Sequence[str]], stuck: Sequence[int]
-) -> list[Found]:
-    """The consistent cases of a problem in numbers, those with fewest forces first.
-
-    Parameters
-    ----------
-    options
-        What may hold, by contact.
-    stuck
-        As for `outcome`.
-    """
-    found = []
-    for statuses in sorted(product(*options), key=_forces):
-        case = Case(statuses, merged_in(level, statuses), (False,) * len(statuses))
-        reached = outcome(level, case, stuck)
-        if reached is not None and holds(reached.conditions):
-            found.append(Found(case, reached))
-    return found
-
-
-def _forces(statuses: Statuses) -> tuple[int, int]:
-    """How many normal forces there are; of cases with as many, those that stick come first."""
-    return sum(each != OPEN for each in statuses), -sum(each == STICKS for each in statuses)
-
-
-def merged_in(level: Level, statuses: Statuses) -> tuple[int | None, ...]:
-    """By contact that sticks: an earlier one whose friction acts in the same direction."""
-    found: list[int | None] = [None] * len(statuses)
-    sticking = [i for i, each in enumerate(statuses) if each == STICKS]
-    for place, j in enumerate(sticking):
-        for i in sticking[:place]:
-            if found[i] is None and _is_parallel(level, level.across(i), level.across(j)):
-                found[j] = i
-                break
-    return tuple(found)
-
-
-def _is_parallel(level: Level, i: int, j: int) -> bool:
-    G = level.delassus
-    return bool(G[i][i] * G[j][j] - G[i][j] ** 2 <= DEPENDENT * G[i][i] * G[j][j])
-
-
-def several(level: Level, found: Sequence[Found]) -> list[Found]:
-    """The first of each kind: cases that lead to the same speeds are one."""
-    kinds: list[Found] = []
-    for each in found:
-        if not any(_is_alike(level, each, other) for other in kinds):
-            kinds.append(each)
-    return kinds
-
-
-def _is_alike(level: Level, one: Found, other: Found) -> bool:
-    pairs = zip(one.outcome.after, other.outcome.after, level.noise, strict=True)
-    return all(abs(a - b) <= SEVERAL * noise for a, b, noise in pairs)
-
-
-def by_history(level: Level, found: Sequence[Found]) -> list[Found]:
-    """The cases without those in which a contact slips that static friction, if larger, keeps at rest."""
-    kept = {
-        k
-        for each in found
-        for k, status in enumerate(each.case.statuses)
-        if status == STICKS and level.static[k] > level.friction[k]
-    }
-    return [each for each in found if not any(each.case.statuses[k] in SIGNS for k in kept)]
-
 
 @attrs.frozen
 class Decision:
@@ -118,7 +45,7 @@ class Decision:
     approaching
         Those of them that approach: they have restitution.
     impulses
-        What holds at each of these while velocities change; None if they do not.
+        What holds at each of these while velocities change, in each phase of the impact; empty if they do not.
     resting
         Those of them that do not separate.
     sliding
@@ -129,7 +56,7 @@ class Decision:
 
     closed: tuple[int, ...]
     approaching: tuple[int, ...]
-    impulses: Case | None
+    impulses: tuple[Case, ...]
     resting: tuple[int, ...]
     sliding: tuple[int, ...]
     forces: Case
@@ -166,6 +93,9 @@ class Undecided:
 
 
 NONE, SEVERAL_CASES = "painleve", "not unique"
+NEWTON, POISSON, SEQUENTIAL = LAWS = "newton", "poisson", "sequential"
+# Cases by phases, impulses and speeds afterwards by rows.
+Ended = tuple[tuple[Case, ...], list[float], list[float]]
 
 
 @attrs.frozen(eq=False)
@@ -176,10 +106,13 @@ class Judge:
     ----------
     together
         Gaps below this are closed.
+    law
+        Of impacts: ``newton``, ``poisson``, or ``sequential`` for Newton's law of one contact after another.
     """
 
     mechanics: Mechanics
     together: float
+    law: str = NEWTON
 
     def decide(
         self, event: Event, statuses: Statuses, t: float, x: np.ndarray, parameters: np.ndarray
@@ -187,31 +120,29 @@ class Judge:
         """What happens at an event in a mode in which these statuses hold."""
         view = self.mechanics.at(t, x, parameters)
         closed = self.closed(event, statuses, view)
-        impulses, approaching = None, []
+        impulses: tuple[Case, ...] = ()
+        approaching: list[int] = []
         if event.kind in SUDDEN:
             approaching = self.approaching(event, statuses, closed, view)
-            restitution = [view.restitution[i] if i in approaching else 0.0 for i in closed]
-            level = self.mechanics.impacts(view, closed, restitution)
-            if event.kind == SETTLES:
-                impulses = stopped(level)
-                after = outcome(level, impulses, range(len(closed)))
-                assert after is not None, "directions that depend on each other are left out"
-            else:
-                options = [(OPEN, *closed_statuses(self.contact(i))) for i in closed]
-                kinds = several(level, found := consistent(level, options, range(len(closed))))
-                if len(kinds) != 1:
-                    return _undecided(closed, kinds, True)
-                impulses, after = found[0].case, found[0].outcome
-            rows = self.mechanics.rows_of(closed)
-            velocities = view.moved(after.forces, rows, view.velocities)
+            level = self.first_phase(view, closed, approaching)
+            still = [k for k, i in enumerate(closed) if self.is_still(view, self.mechanics.places[i][1])]
+            ended = (
+                self._stopped(level, still)
+                if event.kind == SETTLES
+                else self._impact(view, level, closed, approaching)
+            )
+            if isinstance(ended, Undecided):
+                return ended
+            impulses, forces, after = ended
+            velocities = view.moved(forces, self.mechanics.rows_of(closed), view.velocities)
             x = np.array([*x[: len(velocities)], *velocities])
-            resting = [
-                i
-                for k, i in enumerate(closed)
-                if after.after[level.row(k)] <= NOISE * level.noise[level.row(k)]
-            ]
+            rows = [level.row(k) for k in range(len(closed))]
+            resting = [i for i, row in zip(closed, rows, strict=True) if after[row] <= NOISE * level.noise[row]]
             moving = self.mechanics.at(t, x, parameters)
-            sliding = [self._sliding(moving, i) for i in resting]
+            sliding = [
+                0 if event.kind == SETTLES and closed.index(i) in still else self._sliding(moving, i)
+                for i in resting
+            ]
         else:
             moving, resting = view, [*closed]
             sliding = [
@@ -219,6 +150,47 @@ class Judge:
             ]
         parts = tuple(closed), tuple(approaching), impulses
         return self._rest(event, statuses, parts, moving, resting, sliding)
+
+    def first_phase(self, view: View, closed: Sequence[int], approaching: Sequence[int]) -> Level:
+        """The problem of the velocities of an impact; by Poisson's law of its compression."""
+        newton = self.law != POISSON
+        restitution = [view.restitution[i] if newton and i in approaching else 0.0 for i in closed]
+        return self.mechanics.impacts(view, closed, restitution)
+
+    def next_phase(
+        self, view: View, level: Level, reached: Outcome, closed: Sequence[int], approaching: Sequence[int]
+    ) -> Level:
+        """The problem of an expansion: impulses of compression come back, and more if a gap would close."""
+        given = [
+            view.restitution[i] * reached.forces[level.row(k)] if i in approaching else 0.0
+            for k, i in enumerate(closed)
+        ]
+        return attrs.evolve(level, before=reached.after, given=given)
+
+    def phases(self, event: Event) -> int:
+        """How many problems an impact is."""
+        return 2 if self.law == POISSON and event.kind == IMPACT else 1
+
+    def _impact(
+        self, view: View, level: Level, closed: Sequence[int], approaching: Sequence[int]
+    ) -> Ended | Undecided:
+        options = [(OPEN, *closed_statuses(self.contact(i))) for i in closed]
+        cases, forces = [], np.zeros(len(level.before))
+        for phase in range(self.phases(Event(IMPACT))):
+            if phase:
+                level = self.next_phase(view, level, found[0].outcome, closed, approaching)
+            kinds = several(level, found := consistent(level, options, range(len(closed))))
+            if len(kinds) != 1:
+                return _undecided(closed, kinds, True)
+            cases.append(found[0].case)
+            forces += np.array(found[0].outcome.forces, dtype=float)
+        return tuple(cases), list(forces), found[0].outcome.after
+
+    def _stopped(self, level: Level, still: Sequence[int]) -> Ended:
+        case = stopped(level, still)
+        reached = outcome(level, case, ())
+        assert reached is not None, "directions that depend on each other are left out"
+        return (case,), reached.forces, reached.after
 
     def _rest(
         self,
@@ -253,7 +225,7 @@ class Judge:
         ]
         sliding = [self._sliding(view, i) for i in resting]
         nothing = Event(SETTLES), (OPEN,) * len(rows)
-        return self._rest(*nothing, (tuple(resting), (), None), view, resting, sliding)
+        return self._rest(*nothing, (tuple(resting), (), ()), view, resting, sliding)
 
     def named(
         self, statuses: Statuses, t: float, x: np.ndarray, parameters: np.ndarray
@@ -291,16 +263,25 @@ class Judge:
     def is_near(self, event: Event, view: View, i: int) -> Any:
         """Whether a contact is closed at an event that changes velocities, in numbers or as an expression.
 
-        At the limit of chatter one that moves is not: it would get further than gaps that count as closed, even
-        against the largest acceleration that the forces could give it.
+        At the limit of chatter one that moves is not.
         """
+        if self.law == SEQUENTIAL and event.kind == IMPACT:
+            return ZERO if isinstance(view.gaps[i], Expression) else False
         near = _not_larger(_size(view.gaps[i]), self.together)
         if event.kind != SETTLES:
             return near
-        row = self.mechanics.places[i][0]
-        height = view.speeds[row] * view.speeds[row]
-        still = _not_larger(height, self.together * view.strong[row])
+        still = self.is_still(view, self.mechanics.places[i][0])
         return And(near, still) if isinstance(near, Expression) else near and still
+
+    def is_still(self, view: View, row: int | None) -> Any:
+        """Whether a direction counts as at rest at the limit of chatter, in numbers or as an expression.
+
+        It gets no further than gaps that count as closed, even against the largest acceleration that the
+        forces could give it. At the limit all speeds are rounding, so their sizes do not tell.
+        """
+        if row is None:
+            return False
+        return _not_larger(view.speeds[row] * view.speeds[row], self.together * view.strong[row])
 
     def contact(self, i: int) -> Contact:
         """What the author gave."""
@@ -327,18 +308,9 @@ class Judge:
         pushing = [level.row(k) for k, each in enumerate(statuses) if each != OPEN]
         for k, each in enumerate(statuses):
             row = level.row(k)
-            if each == OPEN and _is_implied(level, row, pushing):
+            if each == OPEN and is_implied(level, row, pushing):
                 statuses[k] = IDLE
         return attrs.evolve(case, statuses=tuple(statuses))
-
-
-def stopped(level: Level) -> Case:
-    """The case that stops all contacts: impulses of those whose directions do not depend on others."""
-    statuses: list[str] = []
-    for i in range(len(level.places)):
-        pushing = [level.row(k) for k, each in enumerate(statuses) if each == HELD]
-        statuses.append(IDLE if _is_implied(level, level.row(i), pushing) else HELD)
-    return Case(tuple(statuses), (None,) * len(statuses), (False,) * len(statuses))
 
 
 def _size(value: Any) -> Any:
@@ -347,17 +319,6 @@ def _size(value: Any) -> Any:
 
 def _not_larger(value: Any, most: Any) -> Any:
     return LessEqual(value, node(most)) if isinstance(value, Expression) else value <= most
-
-
-def _is_implied(level: Level, row: int, others: Sequence[int]) -> bool:
-    """Whether the direction of a row is a combination of those of other rows."""
-    if not others:
-        return False
-    rows = [*others, row]
-    G = np.array([[level.delassus[i][j] for j in rows] for i in rows], dtype=float)
-    sizes = np.sqrt(np.diag(G))
-    smallest = np.linalg.eigvalsh(G / np.outer(sizes, sizes))[0]
-    return bool(smallest <= DEPENDENT)
 
 
 def _undecided(contacts: Sequence[int], kinds: Sequence[Found], sudden: bool) -> Undecided:

@@ -1,0 +1,132 @@
+"""The consistent cases of a problem in numbers: all are tried, so that none and several are seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import product
+
+import attrs
+import numpy as np
+
+from hybrid.transform.contacts.problem import DEPENDENT, Case, Level, Outcome, holds, outcome
+from hybrid.transform.contacts.statuses import HELD, IDLE, OPEN, SIGNS, STICKS, Statuses
+
+# Solutions whose speeds differ by more than this share of their terms are several.
+SEVERAL = 1e-6
+
+
+@attrs.frozen(eq=False)
+class Found:
+    """A consistent case and what it leads to."""
+
+    case: Case
+    outcome: Outcome
+
+
+def consistent(
+    level: Level, options: Sequence[Sequence[str]], stuck: Sequence[int]
+) -> list[Found]:
+    """The consistent cases of a problem in numbers, those with fewest forces first.
+
+    Parameters
+    ----------
+    options
+        What may hold, by contact.
+    stuck
+        As for `outcome`.
+    """
+    found = []
+    for case in sorted(_cases(level, options), key=_forces):
+        reached = outcome(level, case, stuck)
+        if reached is not None and holds(reached.conditions):
+            found.append(Found(case, reached))
+    return found
+
+
+def _cases(level: Level, options: Sequence[Sequence[str]]) -> Iterator[Case]:
+    """All cases: a contact with an impulse that it is given pushes, and opens or needs more."""
+    ways = [
+        [(status, lifts) for status in each if status != OPEN for lifts in (True, False)]
+        if given > 0
+        else [(status, False) for status in each]
+        for each, given in zip(options, level.given, strict=True)
+    ]
+    for chosen in product(*ways):
+        statuses = tuple(status for status, _ in chosen)
+        yield Case(statuses, merged_in(level, statuses), tuple(lifts for _, lifts in chosen))
+
+
+def _forces(case: Case) -> tuple[int, int]:
+    """How many normal forces are to be found; of cases with as many, those that stick come first."""
+    held = sum(case.is_held(i) for i in range(len(case.statuses)))
+    return held, -sum(each == STICKS for each in case.statuses)
+
+
+def merged_in(level: Level, statuses: Statuses) -> tuple[int | None, ...]:
+    """By contact that sticks: an earlier one whose friction acts in the same direction."""
+    found: list[int | None] = [None] * len(statuses)
+    sticking = [i for i, each in enumerate(statuses) if each == STICKS]
+    for place, j in enumerate(sticking):
+        for i in sticking[:place]:
+            if found[i] is None and _is_parallel(level, level.across(i), level.across(j)):
+                found[j] = i
+                break
+    return tuple(found)
+
+
+def _is_parallel(level: Level, i: int, j: int) -> bool:
+    G = level.delassus
+    return bool(G[i][i] * G[j][j] - G[i][j] ** 2 <= DEPENDENT * G[i][i] * G[j][j])
+
+
+def several(level: Level, found: Sequence[Found]) -> list[Found]:
+    """The first of each kind: cases that lead to the same speeds are one."""
+    kinds: list[Found] = []
+    for each in found:
+        if not any(_is_alike(level, each, other) for other in kinds):
+            kinds.append(each)
+    return kinds
+
+
+def _is_alike(level: Level, one: Found, other: Found) -> bool:
+    pairs = zip(one.outcome.after, other.outcome.after, level.noise, strict=True)
+    return all(abs(a - b) <= SEVERAL * noise for a, b, noise in pairs)
+
+
+def by_history(level: Level, found: Sequence[Found]) -> list[Found]:
+    """The cases without those in which a contact slips that static friction, if larger, keeps at rest."""
+    kept = {
+        k
+        for each in found
+        for k, status in enumerate(each.case.statuses)
+        if status == STICKS and level.static[k] > level.friction[k]
+    }
+    return [each for each in found if not any(each.case.statuses[k] in SIGNS for k in kept)]
+
+
+def stopped(level: Level, still: Sequence[int]) -> Case:
+    """The case that stops all contacts, and the slips of those that are ``still``.
+
+    It has impulses in directions that do not depend on others.
+    """
+    statuses: list[str] = []
+    pushing: list[int] = []
+    for i, (row, _) in enumerate(level.places):
+        statuses.append(IDLE if is_implied(level, row, pushing) else HELD)
+        pushing += [row] if statuses[i] == HELD else []
+    for i in still:
+        if statuses[i] == HELD and not is_implied(level, level.across(i), pushing):
+            statuses[i] = STICKS
+            pushing.append(level.across(i))
+    return Case(tuple(statuses), (None,) * len(statuses), (False,) * len(statuses))
+
+
+def is_implied(level: Level, row: int, others: Sequence[int]) -> bool:
+    """Whether the direction of a row is a combination of those of other rows."""
+    if not others:
+        return False
+    rows = [*others, row]
+    G = np.array([[level.delassus[i][j] for j in rows] for i in rows], dtype=float)
+    sizes = np.sqrt(np.diag(G))
+    smallest = np.linalg.eigvalsh(G / np.outer(sizes, sizes))[0]
+    return bool(smallest <= DEPENDENT)
