@@ -41,7 +41,8 @@ def status_of(trajectory: Trajectory, code: int) -> Status:
     complete = code == codes.DONE
     if trajectory.tangents:
         complete = complete and has_tangents(trajectory) and carries_plainly(trajectory.run)
-    if complete and is_plain(trajectory.model, trajectory.run, len(trajectory.beyond)):
+    doubtful = trajectory.system.growth is not None and trajectory.system.growth.ambiguous
+    if complete and not doubtful and is_plain(trajectory.model, trajectory.run, len(trajectory.beyond)):
         return SUCCESS
     status = _status(trajectory, code)
     notes = notes_of(trajectory, code)
@@ -164,6 +165,9 @@ def _status(trajectory: Trajectory, code: int) -> Status:
             "Choose the order in which the transitions are listed and declare "
             "HybridSystem(listed_order=True), or add one for the corner.",
         )
+    together = _impacts_in_doubt(trajectory) if code == codes.DONE else None
+    if together is not None:
+        return together
     if code == codes.DONE and grazed:
         return _grazed(trajectory, grazed)
     if code == codes.DONE:
@@ -194,6 +198,23 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     bare_time = trajectory.model.period == 0.0 and trajectory.model.timed.item(run.mode) == 1
     name, derived = (names[last], _is_derived(trajectory, last)) if last >= 0 else (None, False)
     return run_status(code, where, name, bare_time=bare_time, derived=derived)
+
+
+def _impacts_in_doubt(trajectory: Trajectory) -> Status | None:
+    """Status of a run in which contacts closed together whose order would matter; else None."""
+    growth, names = trajectory.system.growth, trajectory.system.transition_names
+    if growth is None or trajectory.system.listed_order or not growth.ambiguous:
+        return None
+    fired = [names[i] for i in np.flatnonzero(trajectory.run.fires) if names[i] in growth.ambiguous]
+    if not fired:
+        return None
+    contacts = " and ".join(dict.fromkeys(growth.ambiguous[name] for name in fired))
+    return Status(
+        StatusCode.AMBIGUOUS_ORDER,
+        f"Contacts closed together, {contacts}: their impacts were solved at once, and one after another they "
+        "would lead elsewhere, by their order.",
+        'Start beside this case, or say mechanics(impacts="sequential"): the contact listed first is first.',
+    )
 
 
 def _is_derived(trajectory: Trajectory, transition: int) -> bool:

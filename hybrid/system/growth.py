@@ -34,11 +34,14 @@ class Growth(Protocol):
         What the compiler has made of the functions of earlier stages.
     told
         By transition: why a run ends there, in words.
+    ambiguous
+        By transition: names of what happens there at once, if another order would lead elsewhere.
     """
 
     original: Any
     written: dict[Any, Any]
     told: Mapping[str, str]
+    ambiguous: Mapping[str, str]
 
     @property
     def current(self) -> Any:

@@ -161,6 +161,11 @@ class _Growth:
         """Why runs end, in words."""
         return self.inner.told
 
+    @property
+    def ambiguous(self) -> Mapping[str, str]:
+        """Where another order would lead elsewhere."""
+        return self.inner.ambiguous
+
     def extend(self, transition: str, place: Place) -> bool:
         """Make what follows a transition that has ended a run at a place."""
         t, x, parameters = place

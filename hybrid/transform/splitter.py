@@ -52,6 +52,7 @@ class Splitter:
         self.lock = RLock()
         self.written: dict[Any, Any] = {}
         self.told: dict[str, str] = {}
+        self.ambiguous: dict[str, str] = {}
         self.heights: dict[int, Function] = {}
         self.variables = system.variables
         self.symbols = model_symbols(system.dimension, len(system.parameters))

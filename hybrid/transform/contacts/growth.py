@@ -13,16 +13,18 @@ import numpy as np
 
 from hybrid.errors import ArgumentError
 from hybrid.expression.evaluation import Program, expressed, scalar
-from hybrid.expression.nodes import Expression, Number, add
+from hybrid.expression.nodes import Expression, Number, add, node
 from hybrid.expression.operations import And, Not
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.system.outputs import Formula, Output
 from hybrid.transform.contacts.cases import Written, written
 from hybrid.transform.contacts.contact import Contact
-from hybrid.transform.contacts.decide import NONE, SEVERAL_CASES, Decision, Judge, Undecided
+from hybrid.transform.contacts.decide import NONE, SEQUENTIAL, SEVERAL_CASES, Decision, Judge, Undecided
 from hybrid.transform.contacts.events import BREAKS, IMPACT, OPENS, SETTLES, STOPS, Event
+from hybrid.transform.contacts.linear import dot
 from hybrid.transform.contacts.modes import Held, held
+from hybrid.transform.contacts.order import order_matters
 from hybrid.transform.contacts.statuses import (
     IDLE,
     OPEN,
@@ -35,6 +37,8 @@ from hybrid.transform.contacts.statuses import (
 from hybrid.transform.contacts.view import FORCES
 
 SETTLING = "settles"
+# A gain of kinetic energy below this share is rounding.
+GAIN = 1e-9
 Place = tuple[float, np.ndarray, np.ndarray]
 # What holds at each contact, and whose friction each shares.
 Key = tuple[Statuses, tuple[int | None, ...]]
@@ -92,7 +96,8 @@ class ContactGrowth:
         self.frontier: dict[str, Watch] = {}
         self.told: dict[str, str] = {}
         self.notes: dict[str, None] = {}
-        self.names: dict[Any, str] = {}
+        # Transitions of impacts whose order would matter, each with the names of the contacts.
+        self.ambiguous: dict[str, str] = {}
         count = len(self.mechanics.contacts)
         self.settling = Watch(
             SETTLING, (OPEN,) * count, Event(SETTLES), Guard(scalar(Number(1)), +1, at_start=True), "settle"
@@ -137,8 +142,40 @@ class ContactGrowth:
                 return False
             for each in self._alike(watch, decision):
                 self._write(each, decision, place)
+            self._remark(watch, decision, place)
             self.stage = None
             return True
+
+    def _remark(self, watch: Watch, decision: Decision, place: Place) -> None:
+        """Note what is doubtful about an impact: the order of several, a gain of energy."""
+        if watch.event.kind != IMPACT:
+            return
+        transition, names = watch.cases[-1][0], [self.contacts[i].name for i in decision.closed]
+        view = self.mechanics.at(*place)
+        if self.judge.law != SEQUENTIAL and order_matters(self.mechanics, view, decision.closed):
+            for each in self._alike(watch, decision):
+                self.ambiguous[each.cases[-1][0].name] = ", ".join(map(repr, names))
+        before, after = (self._energy(x, place) for x in (place[1], self._after(transition, place)))
+        if after - before > GAIN * before:
+            self.notes[
+                f"{transition.name}: this impact gains energy, {after - before:.3g} of {before:.3g} at "
+                f"t = {place[0]:g}: Newton's law with friction may. mechanics(impacts=\"poisson\") may not."
+            ] = None
+
+    def _after(self, transition: Transition, place: Place) -> np.ndarray:
+        t, x, parameters = place
+        assert transition.reset is not None, "an impact has a reset"
+        return np.array(transition.reset.function(t, x, parameters), dtype=float)
+
+    def _energy(self, x: np.ndarray, place: Place) -> float:
+        """Kinetic energy."""
+        t, _, parameters = place
+        return float(self._kinetic.run(self.mechanics.space.values(t, x, parameters))[0])
+
+    @cached_property
+    def _kinetic(self) -> Program:
+        u = [*self.mechanics.space.u]
+        return Program([node(0.5 * dot(u, [dot(row, u) for row in self.mechanics.equations.mass]))])
 
     def _alike(self, watch: Watch, decision: Decision) -> list[Watch]:
         """The events that a decision is about: an impact of several contacts is one of each of them."""
