@@ -101,7 +101,9 @@ class Ending:
         self._held = None
 
 
-NO_WAY_ON = "Change the parameters (less friction), or the start; the result holds everything up to that time."
+NO_WAY_ON = (
+    "Change the parameters (less friction), or the start; the result holds everything up to that time."
+)
 
 
 def has_tangents(trajectory: Trajectory) -> bool:
@@ -186,7 +188,9 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     if code == codes.TERMINAL and trajectory.system.growth is not None:
         told = trajectory.system.growth.told.get(names[run.last_fired])
         if told is not None:
-            return Status(StatusCode.TERMINAL, f"Ended by {names[run.last_fired]!r} {where}. {told}", NO_WAY_ON)
+            return Status(
+                StatusCode.TERMINAL, f"Ended by {names[run.last_fired]!r} {where}. {told}", NO_WAY_ON
+            )
     full = _full(trajectory) if code == codes.NON_FINITE else None
     if full is not None:
         return full

@@ -27,12 +27,15 @@ def tangent_projection(
     return np.asarray(np.eye(gradients.shape[1]) - across.T @ across)
 
 
-def _gradients(mode: Mode, variables: Variables, t: float, x: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+def _gradients(
+    mode: Mode, variables: Variables, t: float, x: np.ndarray, parameters: np.ndarray
+) -> np.ndarray:
     """Derivatives of what a mode holds, from the expressions, by central differences if there are none."""
     from hybrid.expression.derivatives import jacobian_of
     from hybrid.expression.evaluation import expressed
     from hybrid.expression.tracing import TraceError, model_symbols, trace
 
+    assert mode.holds is not None, "this is asked of modes that hold something"
     n = variables.tangent_dimension
     try:
         traced = trace(mode.holds, variables.components, variables.parameter_names)

@@ -53,7 +53,7 @@ def choose_mode(
                 return index, ()
             beyond = [system.transitions[i] for i in own if verdicts[i] == codes.BEYOND]
             return index, tuple(tr.name for tr in beyond)
-        return _refused(system, run, verdicts, [modes[i] for i in within])
+        return _refused(system, model, run, verdicts, [modes[i] for i in within])
     verdicts, undefined = _verdicts(system, plan, model, run, work, range(len(modes)))
     violated = {transition.source for transition in _against(system, verdicts)}
     if undefined and len(violated) == len(modes):
@@ -62,7 +62,7 @@ def choose_mode(
     allowed = [name for name in modes if name not in violated]
     if len(allowed) == 1 or move_alike(system, model, run, allowed):
         return modes.index(allowed[0]), ()
-    return _refused(system, run, verdicts, allowed)
+    return _refused(system, model, run, verdicts, allowed)
 
 
 def _excludes_start(system: HybridSystem, model: Any, index: int) -> bool:
@@ -72,7 +72,7 @@ def _excludes_start(system: HybridSystem, model: Any, index: int) -> bool:
     return bool(transition.guard.at_start and leads_away)
 
 
-def _refused(system: HybridSystem, run: Any, verdicts: list[int], allowed: list[str]) -> NoReturn:
+def _refused(system: HybridSystem, model: Any, run: Any, verdicts: list[int], allowed: list[str]) -> NoReturn:
     if not allowed and system.growth is not None:
         # The state lies on surfaces; a mode along these may not have been made yet. The last is the nearest.
         for transition in reversed(_against(system, verdicts)):

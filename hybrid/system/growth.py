@@ -32,16 +32,20 @@ class Growth(Protocol):
         The user's system.
     written
         What the compiler has made of the functions of earlier stages.
-    told
-        By transition: why a run ends there, in words.
-    ambiguous
-        By transition: names of what happens there at once, if another order would lead elsewhere.
     """
 
     original: Any
     written: dict[Any, Any]
-    told: Mapping[str, str]
-    ambiguous: Mapping[str, str]
+
+    @property
+    def told(self) -> Mapping[str, str]:
+        """By transition: why a run ends there, in words."""
+        ...
+
+    @property
+    def ambiguous(self) -> Mapping[str, str]:
+        """By transition: names of what happens there at once, if another order would lead elsewhere."""
+        ...
 
     @property
     def current(self) -> Any:

@@ -7,7 +7,7 @@ holds also where nothing else of the perturbation is left: in a rest at a fixed 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import count
 from typing import Any
 

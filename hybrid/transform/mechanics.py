@@ -115,14 +115,16 @@ def mechanics(
     from hybrid.transform.contacts.kinematics import kinematics_of
     from hybrid.transform.contacts.view import Mechanics
 
-    q, u = as_state(tuple(coordinates)), as_state(tuple(velocities))
+    q, u = (_names(what, value) for what, value in (("coordinates", coordinates), ("velocities", velocities)))
     if len(q) != len(u) or not q:
         raise ModelError(
             f"mechanics: velocities are the rates of coordinates, one for each; got {len(q)} coordinates and "
             f"{len(u)} velocities."
         )
     arguments.one_of("mechanics: impacts", impacts, LAWS)
-    touching = tuple(arguments.items("mechanics: contacts", contacts, "be a list of Contact objects", least=1))
+    touching = tuple(
+        arguments.items("mechanics: contacts", contacts, "be a list of Contact objects", least=1)
+    )
     for i, each in enumerate(touching):
         arguments.instance(f"mechanics: contacts[{i}]", each, Contact)
     values = as_parameters({} if parameters is None else parameters)
@@ -149,3 +151,11 @@ def mechanics(
         derived_from=Watched([each for each in functions if callable(each)]),
     )
     return ContactGrowth(judge, original).current
+
+
+def _names(what: str, value: Iterable[str]) -> tuple[str, ...]:
+    """Names of coordinates or of velocities."""
+    names = as_state(value if isinstance(value, str) else tuple(value))
+    if isinstance(names, int):
+        raise arguments.refusal(f"mechanics: {what}", "be names", value)
+    return names

@@ -1,21 +1,23 @@
-"""A decision as conditions on the state at the event, and as the velocities after it."""
+"""A decision as conditions on the state at the event, and as the state after it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
+
 import attrs
 import numpy as np
 
 from hybrid.expression.evaluation import Program
 from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.expression.operations import Less, LessEqual, Not
+from hybrid.system.growth import Place
 from hybrid.transform.contacts.decide import Decision, Judge
 from hybrid.transform.contacts.events import SETTLES, SUDDEN, Event
 from hybrid.transform.contacts.problem import NOISE, Case, Level, Outcome, matrix, outcome
 from hybrid.transform.contacts.solutions import stopped
 from hybrid.transform.contacts.statuses import OPEN, STICKS, Statuses
-from hybrid.transform.contacts.view import View
+from hybrid.transform.contacts.view import Mechanics, View
 
 
 @attrs.frozen(eq=False)
@@ -34,71 +36,130 @@ class Written:
     state: list[Expression] | None
 
 
-def written(
-    judge: Judge,
-    event: Event,
-    statuses: Statuses,
-    decision: Decision,
-    place: tuple[float, np.ndarray, np.ndarray],
-) -> Written:
-    """A decision at an event of a mode as expressions; ``place`` is ``(t, x, parameters)`` where it was made."""
-    mechanics, view = judge.mechanics, judge.mechanics.view
-    conditions: list[Expression] = []
-    if event.kind in SUDDEN:
-        conditions += [
-            *_closed(judge, event, statuses, decision),
-            *_approaching(judge, event, statuses, decision),
-        ]
-    state: list[Expression] | None = None
-    numbers = mechanics.at(*place)
-    if decision.impulses:
-        closed, approaching = decision.closed, decision.approaching
-        levels = [judge.first_phase(each, closed, approaching) for each in (view, numbers)]
-        forces: list[Any] = [0.0] * len(levels[0].before)
-        for phase, case in enumerate(decision.impulses):
-            if phase:
-                pairs = zip((view, numbers), levels, ends, strict=True)
-                levels = [judge.next_phase(*each, closed, approaching) for each in pairs]
-            ends = [_outcome(*levels, case, range(len(closed))), _in_numbers(levels[1], case)]
-            forces = [a + b for a, b in zip(forces, ends[0].forces, strict=True)]
-            if event.kind != SETTLES:
-                conditions += _consistent(ends[0])
-        if event.kind == SETTLES:
-            conditions += _slid(judge, decision)
-        else:
-            conditions += _parted(levels[0], ends[0], decision)
-        velocities = view.moved(forces, mechanics.rows_of(closed), view.velocities)
-        state = [*_closed_exactly(judge, decision, statuses, event, numbers), *map(node, velocities)]
-        t, x, parameters = place
-        x = np.array(Program(state).run(mechanics.space.values(t, x, parameters)), dtype=float)
-        view, numbers = mechanics.with_velocities(state[len(velocities) :]), mechanics.at(t, x, parameters)
-    level, in_numbers = (mechanics.forces(each, decision.resting) for each in (view, numbers))
-    stuck = [k for k, sign in enumerate(decision.sliding) if sign == 0]
-    conditions += _consistent(_outcome(level, in_numbers, decision.forces, stuck))
-    return Written(conditions, state)
+@attrs.frozen(eq=False)
+class Happening:
+    """A decision at an event of a mode, that can be written.
 
-
-def _closed_exactly(
-    judge: Judge, decision: Decision, statuses: Statuses, event: Event, numbers: View
-) -> list[Expression]:
-    """The coordinates after an event: gaps that count as closed and stay so are closed, by the least move.
-
-    The move is the smallest in the metric of the masses.
+    Attributes
+    ----------
+    event, statuses
+        The event, and what holds in the mode.
+    decision
+        What happens.
     """
-    mechanics = judge.mechanics
-    q: list[Expression] = [*mechanics.space.q]
-    if all(statuses[i] != OPEN or i == event.contact for i in decision.resting):
-        return q
-    view = mechanics.view
-    level, in_numbers = (
-        attrs.evolve(
-            mechanics.forces(each, decision.resting),
-            before=[mechanics.gap_of(each, row) for row in mechanics.rows_of(decision.resting)],
-        )
-        for each in (view, numbers)
-    )
-    reached = _outcome(level, in_numbers, stopped(in_numbers, ()), ())
-    return [*map(node, view.moved(reached.forces, mechanics.rows_of(decision.resting), q))]
+
+    judge: Judge
+    event: Event
+    statuses: Statuses
+    decision: Decision
+
+    @property
+    def mechanics(self) -> Mechanics:
+        """The equations."""
+        return self.judge.mechanics
+
+    @property
+    def opens(self) -> list[int]:
+        """The closed contacts that neither the mode nor the event closes."""
+        return [i for i in self.decision.closed if self.statuses[i] == OPEN and i != self.event.contact]
+
+    def written(self, place: Place) -> Written:
+        """The decision as expressions; ``place`` is where it was made."""
+        view, numbers, decision = self.mechanics.view, self.mechanics.at(*place), self.decision
+        conditions: list[Expression] = []
+        state: list[Expression] | None = None
+        if self.event.kind in SUDDEN:
+            conditions += [*self._closed(), *self._approaching()]
+            last, forces = self._impact(numbers, conditions)
+            conditions += self._slid() if self.event.kind == SETTLES else self._parted(*last)
+            velocities = view.moved(forces, self.mechanics.rows_of(decision.closed), view.velocities)
+            state = [*self._coordinates(numbers), *map(node, velocities)]
+            t, x, parameters = place
+            x = np.array(Program(state).run(self.mechanics.space.values(t, x, parameters)), dtype=float)
+            view = self.mechanics.with_velocities(state[len(velocities) :])
+            numbers = self.mechanics.at(t, x, parameters)
+        level, in_numbers = (self.mechanics.forces(each, decision.resting) for each in (view, numbers))
+        stuck = [k for k, sign in enumerate(decision.sliding) if sign == 0]
+        conditions += _consistent(_outcome(level, in_numbers, decision.forces, stuck))
+        return Written(conditions, state)
+
+    def _impact(self, numbers: View, conditions: list[Expression]) -> tuple[tuple[Level, Outcome], list[Any]]:
+        """The last problem of velocities with its outcome, and all impulses; conditions are added."""
+        judge, view = self.judge, self.mechanics.view
+        closed, approaching = self.decision.closed, self.decision.approaching
+        level, in_numbers = (judge.first_phase(each, closed, approaching) for each in (view, numbers))
+        everything = range(len(closed))
+        first, *others = self.decision.impulses
+        reached, known = _outcome(level, in_numbers, first, everything), _in_numbers(in_numbers, first)
+        forces = [*reached.forces]
+        for case in others:
+            conditions += _consistent(reached)
+            level = judge.next_phase(view, level, reached, closed, approaching)
+            in_numbers = judge.next_phase(numbers, in_numbers, known, closed, approaching)
+            reached, known = _outcome(level, in_numbers, case, everything), _in_numbers(in_numbers, case)
+            forces = [a + b for a, b in zip(forces, reached.forces, strict=True)]
+        if self.event.kind != SETTLES:
+            conditions += _consistent(reached)
+        return (level, reached), forces
+
+    def _closed(self) -> Iterator[Expression]:
+        """That these gaps are closed, of those that the mode and the event do not close, and no others."""
+        for i, status in enumerate(self.statuses):
+            if status == OPEN and i != self.event.contact:
+                near = self.judge.is_near(self.event, self.mechanics.view, i)
+                yield near if i in self.decision.closed else Not(near)
+
+    def _approaching(self) -> Iterator[Expression]:
+        """That these contacts approach, of those that the mode and the event leave open, and no others."""
+        for i in self.opens if self.event.kind != SETTLES else []:
+            moves_on = Less(self.mechanics.view.speeds[self.mechanics.places[i][0]], ZERO)
+            yield moves_on if i in self.decision.approaching else Not(moves_on)
+
+    def _slid(self) -> Iterator[Expression]:
+        """That contacts slip or do not at the limit of chatter."""
+        view = self.mechanics.view
+        for i, sign in zip(self.decision.resting, self.decision.sliding, strict=True):
+            row = self.mechanics.places[i][1]
+            if row is not None:
+                still = self.judge.is_still(view, row)
+                yield Not(still) if sign else still
+                if sign:
+                    yield Less(ZERO, sign * view.speeds[row])
+
+    def _parted(self, level: Level, reached: Outcome) -> Iterator[Expression]:
+        """That contacts separate or do not, and slip or do not, after the impulses."""
+        decision, case = self.decision, self.decision.impulses[-1]
+        for k, i in enumerate(decision.closed):
+            row = level.row(k)
+            speed, noise = node(reached.after[row]), node(level.noise[row])
+            if i not in decision.resting:
+                yield Not(_not_positive(speed, noise))
+                continue
+            if speed != 0:
+                yield _not_positive(speed, noise)
+            if level.places[k][1] is None or case.statuses[k] == STICKS:
+                continue
+            row = level.across(k)
+            slip, noise = node(reached.after[row]), node(level.noise[row])
+            sign = decision.sliding[decision.resting.index(i)]
+            if sign:
+                yield Not(_not_positive(sign * slip, noise))
+            else:
+                yield _not_positive(slip, noise)
+                yield _not_negative(slip, noise)
+
+    def _coordinates(self, numbers: View) -> list[Expression]:
+        """The coordinates afterwards: gaps that count as closed and stay so are closed, by the least move.
+
+        The move is the smallest in the metric of the masses.
+        """
+        q: list[Expression] = [*self.mechanics.space.q]
+        resting, view = self.decision.resting, self.mechanics.view
+        if not set(self.opens) & set(resting):
+            return q
+        level, in_numbers = (self.mechanics.closing(each, resting) for each in (view, numbers))
+        reached = _outcome(level, in_numbers, stopped(in_numbers, ()), ())
+        return [*map(node, view.moved(reached.forces, self.mechanics.rows_of(resting), q))]
 
 
 def _outcome(level: Level, in_numbers: Level, case: Case, stuck: Sequence[int]) -> Outcome:
@@ -116,62 +177,6 @@ def _in_numbers(level: Level, case: Case) -> Outcome:
 def _consistent(reached: Outcome) -> list[Expression]:
     """That a case is consistent."""
     return [_not_negative(node(value), node(noise)) for value, noise in reached.conditions]
-
-
-def _closed(judge: Judge, event: Event, statuses: Statuses, decision: Decision) -> list[Expression]:
-    """That these gaps are closed, of those that the mode and the event do not close, and no others."""
-    found, view = [], judge.mechanics.view
-    for i, status in enumerate(statuses):
-        if status == OPEN and i != event.contact:
-            found.append(judge.is_near(event, view, i) if i in decision.closed else Not(judge.is_near(event, view, i)))
-    return found
-
-
-def _approaching(judge: Judge, event: Event, statuses: Statuses, decision: Decision) -> list[Expression]:
-    """That these contacts approach, of those that a mode and an event leave open, and no others."""
-    if event.kind == SETTLES:
-        return []
-    found = []
-    for i in decision.closed:
-        if statuses[i] == OPEN and i != event.contact:
-            moves_on = Less(judge.mechanics.view.speeds[judge.mechanics.places[i][0]], ZERO)
-            found.append(moves_on if i in decision.approaching else Not(moves_on))
-    return found
-
-
-def _slid(judge: Judge, decision: Decision) -> list[Expression]:
-    """That contacts slip or do not at the limit of chatter."""
-    found, view = [], judge.mechanics.view
-    for i, sign in zip(decision.resting, decision.sliding, strict=True):
-        row = judge.mechanics.places[i][1]
-        if row is not None:
-            still = judge.is_still(view, row)
-            found += [Not(still), Less(ZERO, sign * view.speeds[row])] if sign else [still]
-    return found
-
-
-def _parted(level: Level, reached: Outcome, decision: Decision) -> list[Expression]:
-    """That contacts separate or do not, and slip or do not, after the impulses."""
-    case = decision.impulses[-1]
-    found = []
-    for k, i in enumerate(decision.closed):
-        row = level.row(k)
-        speed = node(reached.after[row])
-        if i not in decision.resting:
-            found.append(Not(_not_positive(speed, node(level.noise[row]))))
-            continue
-        if speed != 0:
-            found.append(_not_positive(speed, node(level.noise[row])))
-        if level.places[k][1] is None or case.statuses[k] == STICKS:
-            continue
-        row = level.across(k)
-        slip, noise = node(reached.after[row]), node(level.noise[row])
-        sign = decision.sliding[decision.resting.index(i)]
-        if sign == 0:
-            found += [_not_positive(slip, noise), _not_negative(slip, noise)]
-        else:
-            found.append(Not(_not_positive(sign * slip, noise)))
-    return found
 
 
 def _not_negative(value: Expression, noise: Expression) -> Expression:

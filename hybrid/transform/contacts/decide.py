@@ -34,6 +34,7 @@ from hybrid.transform.contacts.statuses import (
 )
 from hybrid.transform.contacts.view import Mechanics, View
 
+
 @attrs.frozen
 class Decision:
     """What happens at an event.
@@ -63,7 +64,7 @@ class Decision:
 
     def target(self, count: int) -> tuple[Statuses, tuple[int | None, ...]]:
         """What holds at each of all contacts afterwards, and whose friction each shares."""
-        statuses, merged = [OPEN] * count, [None] * count
+        statuses, merged = [OPEN] * count, list[int | None]([None] * count)
         for i, status, other in zip(self.resting, self.forces.statuses, self.forces.merged, strict=True):
             statuses[i] = status
             merged[i] = None if other is None else self.resting[other]
@@ -137,7 +138,9 @@ class Judge:
             velocities = view.moved(forces, self.mechanics.rows_of(closed), view.velocities)
             x = np.array([*x[: len(velocities)], *velocities])
             rows = [level.row(k) for k in range(len(closed))]
-            resting = [i for i, row in zip(closed, rows, strict=True) if after[row] <= NOISE * level.noise[row]]
+            resting = [
+                i for i, row in zip(closed, rows, strict=True) if after[row] <= NOISE * level.noise[row]
+            ]
             moving = self.mechanics.at(t, x, parameters)
             sliding = [
                 0 if event.kind == SETTLES and closed.index(i) in still else self._sliding(moving, i)
@@ -167,24 +170,22 @@ class Judge:
         ]
         return attrs.evolve(level, before=reached.after, given=given)
 
-    def phases(self, event: Event) -> int:
-        """How many problems an impact is."""
-        return 2 if self.law == POISSON and event.kind == IMPACT else 1
-
     def _impact(
         self, view: View, level: Level, closed: Sequence[int], approaching: Sequence[int]
     ) -> Ended | Undecided:
         options = [(OPEN, *closed_statuses(self.contact(i))) for i in closed]
-        cases, forces = [], np.zeros(len(level.before))
-        for phase in range(self.phases(Event(IMPACT))):
-            if phase:
-                level = self.next_phase(view, level, found[0].outcome, closed, approaching)
-            kinds = several(level, found := consistent(level, options, range(len(closed))))
+        cases: list[Case] = []
+        forces = np.zeros(len(level.before))
+        while True:
+            kinds = several(level, consistent(level, options, range(len(closed))))
             if len(kinds) != 1:
                 return _undecided(closed, kinds, True)
-            cases.append(found[0].case)
-            forces += np.array(found[0].outcome.forces, dtype=float)
-        return tuple(cases), list(forces), found[0].outcome.after
+            [found] = kinds
+            cases.append(found.case)
+            forces += np.array(found.outcome.forces, dtype=float)
+            if len(cases) == (2 if self.law == POISSON else 1):
+                return tuple(cases), list(forces), found.outcome.after
+            level = self.next_phase(view, level, found.outcome, closed, approaching)
 
     def _stopped(self, level: Level, still: Sequence[int]) -> Ended:
         case = stopped(level, still)
@@ -196,7 +197,7 @@ class Judge:
         self,
         event: Event,
         statuses: Statuses,
-        parts: tuple[Any, ...],
+        parts: tuple[tuple[int, ...], tuple[int, ...], tuple[Case, ...]],
         view: View,
         resting: Sequence[int],
         sliding: Sequence[int],
@@ -210,11 +211,10 @@ class Judge:
         if len(kinds) != 1:
             return _undecided(resting, kinds, False)
         case = self._with_idle(level, found[0], resting)
-        return Decision(*parts, tuple(resting), tuple(sliding), case)
+        closed, approaching, impulses = parts
+        return Decision(closed, approaching, impulses, tuple(resting), tuple(sliding), case)
 
-    def start(
-        self, t: float, x: np.ndarray, parameters: np.ndarray
-    ) -> Decision | Undecided:
+    def start(self, t: float, x: np.ndarray, parameters: np.ndarray) -> Decision | Undecided:
         """What holds at a start; contacts that approach are open, since their impact is still to come."""
         view = self.mechanics.at(t, x, parameters)
         rows = [self.mechanics.places[i][0] for i in range(len(self.mechanics.contacts))]
@@ -247,17 +247,13 @@ class Judge:
                 found.append(i)
         return found
 
-    def approaching(
-        self, event: Event, statuses: Statuses, closed: Sequence[int], view: View
-    ) -> list[int]:
+    def approaching(self, event: Event, statuses: Statuses, closed: Sequence[int], view: View) -> list[int]:
         """The closed contacts that approach, those of the event among them; none at the limit of chatter."""
         if event.kind == SETTLES:
             return []
         rows = self.mechanics.places
         return [
-            i
-            for i in closed
-            if i == event.contact or (statuses[i] == OPEN and view.speeds[rows[i][0]] < 0.0)
+            i for i in closed if i == event.contact or (statuses[i] == OPEN and view.speeds[rows[i][0]] < 0.0)
         ]
 
     def is_near(self, event: Event, view: View, i: int) -> Any:

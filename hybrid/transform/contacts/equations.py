@@ -121,9 +121,7 @@ class Equations:
         return np.eye(self.space.size)
 
 
-def equations_of(
-    space: Space, mass: Any, forces: Any, kinetic: Any, potential: Any
-) -> Equations:
+def equations_of(space: Space, mass: Any, forces: Any, kinetic: Any, potential: Any) -> Equations:
     """The equations of motion from what an author gives.
 
     Raises
@@ -145,7 +143,9 @@ def equations_of(
     if forces is not None:
         h = space.traced("mechanics: forces", forces)
         if len(h) != n:
-            raise ModelError(f"mechanics: forces must return {n} values, one for each coordinate; got {len(h)}.")
+            raise ModelError(
+                f"mechanics: forces must return {n} values, one for each coordinate; got {len(h)}."
+            )
     if mass is not None:
         rows = _rows(space, space.traced("mechanics: mass", mass))
     else:
@@ -164,7 +164,7 @@ def equations_of(
 
 def _rows(space: Space, values: list[Expression]) -> list[Vector]:
     n = space.size
-    if len(values) == n and n > 1 or n == 1 == len(values):
+    if len(values) == n:
         return [[values[i] if i == j else ZERO for j in range(n)] for i in range(n)]
     if len(values) == n * n:
         return [values[i * n : (i + 1) * n] for i in range(n)]
@@ -185,8 +185,7 @@ def _lagrange(space: Space, kinetic: Any, potential: Any) -> tuple[list[Vector],
     rows = jacobian_of(momenta, space.u)
     lagrangian = T - V
     own = [
-        derivative(lagrangian, q) - space.rate(momentum)
-        for q, momentum in zip(space.q, momenta, strict=True)
+        derivative(lagrangian, q) - space.rate(momentum) for q, momentum in zip(space.q, momenta, strict=True)
     ]
     return rows, own
 

@@ -17,8 +17,9 @@ from hybrid.expression.nodes import Expression, Number, add, node
 from hybrid.expression.operations import And, Not
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
+from hybrid.system.growth import Place
 from hybrid.system.outputs import Formula, Output
-from hybrid.transform.contacts.cases import Written, written
+from hybrid.transform.contacts.cases import Happening, Written
 from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.contacts.decide import NONE, SEQUENTIAL, SEVERAL_CASES, Decision, Judge, Undecided
 from hybrid.transform.contacts.events import BREAKS, IMPACT, OPENS, SETTLES, STOPS, Event
@@ -39,7 +40,6 @@ from hybrid.transform.contacts.view import FORCES
 SETTLING = "settles"
 # A gain of kinetic energy below this share is rounding.
 GAIN = 1e-9
-Place = tuple[float, np.ndarray, np.ndarray]
 # What holds at each contact, and whose friction each shares.
 Key = tuple[Statuses, tuple[int | None, ...]]
 
@@ -159,7 +159,7 @@ class ContactGrowth:
         if after - before > GAIN * before:
             self.notes[
                 f"{transition.name}: this impact gains energy, {after - before:.3g} of {before:.3g} at "
-                f"t = {place[0]:g}: Newton's law with friction may. mechanics(impacts=\"poisson\") may not."
+                f't = {place[0]:g}: Newton\'s law with friction may. mechanics(impacts="poisson") may not.'
             ] = None
 
     def _after(self, transition: Transition, place: Place) -> np.ndarray:
@@ -191,7 +191,7 @@ class ContactGrowth:
     def _write(self, watch: Watch, decision: Decision, place: Place) -> None:
         """Make the transition of a decision."""
         watch.decisions.append(decision)
-        case = written(self.judge, watch.event, watch.statuses, decision, place)
+        case = Happening(self.judge, watch.event, watch.statuses, decision).written(place)
         if case.state is not None:
             t, x, parameters = place
             after = Program(case.state).run(self.mechanics.space.values(t, x, parameters))
@@ -240,7 +240,9 @@ class ContactGrowth:
         if key not in self.made:
             name = mode_name(self.contacts, key[0])
             taken = {each.mode.name for each in self.made.values()}
-            name = next(each for each in chain([name], (f"{name} ({k})" for k in count(2))) if each not in taken)
+            name = next(
+                each for each in chain([name], (f"{name} ({k})" for k in count(2))) if each not in taken
+            )
             forces = held(self.mechanics, *key, place)
             mode = Mode(name, forces.field, holds=forces.holds)
             self.made[key] = Made(mode, forces, [*self._watches(name, key, forces)])
@@ -270,7 +272,9 @@ class ContactGrowth:
                 group = [j for j, by in enumerate(merged) if j == i or by == i]
                 most = add(*(view.static[j] * forces.normal[j] for j in group))
                 for sign in (1, -1):
-                    yield watch(BREAKS, Guard(scalar(most - sign * forces.tangential[i]), -1), f"{name} slips")
+                    yield watch(
+                        BREAKS, Guard(scalar(most - sign * forces.tangential[i]), -1), f"{name} slips"
+                    )
             elif status in SIGNS:
                 assert row is not None, "a contact slips along a direction"
                 yield watch(STOPS, Guard(scalar(SIGNS[status] * view.speeds[row]), -1), f"{name} stops")
@@ -285,7 +289,9 @@ class ContactGrowth:
         asked = reduce(And, (Not(each) for _, each in watch.cases), condition)
         reset = None if case.state is None else Reset(expressed(case.state))
         several = [i for i in decision.closed if watch.statuses[i] == OPEN]
-        title = "+".join(self.contacts[i].name for i in several) if watch.event.kind == IMPACT else watch.title
+        title = (
+            "+".join(self.contacts[i].name for i in several) if watch.event.kind == IMPACT else watch.title
+        )
         to = target.mode.name
         transition = Transition(
             watch.source,
@@ -370,7 +376,9 @@ class ContactGrowth:
             for i in undecided.contacts
             if self.contacts[i].has_friction
         )
-        text = f"contact {names} in mode {watch.source!r}" + (f", with friction {friction}" if friction else "")
+        text = f"contact {names} in mode {watch.source!r}" + (
+            f", with friction {friction}" if friction else ""
+        )
         if undecided.name == NONE:
             return f"No {what} agree with Coulomb's law there (Painleve's paradox): {text}."
         return f"Several {what} are consistent there: {text}; {self._cases(undecided)}."

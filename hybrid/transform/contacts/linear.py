@@ -20,7 +20,9 @@ def dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
     return sum(terms[1:], terms[0]) if terms else 0.0
 
 
-def solved(rows: Sequence[Sequence[Expression]], columns: Sequence[Vector], values: np.ndarray) -> list[Vector]:
+def solved(
+    rows: Sequence[Sequence[Expression]], columns: Sequence[Vector], values: np.ndarray
+) -> list[Vector]:
     """The solutions ``X`` of ``A X = B``, by Gauss's elimination.
 
     Parameters
@@ -39,7 +41,7 @@ def solved(rows: Sequence[Sequence[Expression]], columns: Sequence[Vector], valu
     waiting, pivots = [*range(size)], []
     for k in range(size):
         allowed = [i for i in waiting if left[i][k] is not ZERO]
-        pivot = max(allowed, key=lambda i, k=k: abs(numbers[i, k]))
+        pivot = allowed[int(np.argmax(np.abs(numbers[allowed, k])))]
         waiting.remove(pivot)
         pivots.append(pivot)
         for i in waiting:

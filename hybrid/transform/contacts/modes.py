@@ -77,10 +77,17 @@ def held(
         if level.places[k][1] is not None:
             tangential[i] = node(forces[level.across(k)])
     unknown = {(i, each) for i in _undetermined(mechanics.at(*place), mechanics, statuses) for each in FORCES}
-    unknown |= {(i, "tangential") for pair in enumerate(merged) if pair[1] is not None for i in pair}
+    pairs = [(i, other) for i, other in enumerate(merged) if other is not None]
+    unknown |= {(i, "tangential") for pair in pairs for i in pair}
     field = expressed([*space.u, *map(node, view.moved(forces, rows, view.free))])
     kept = [each for i in closed for each in (view.gaps[i], view.speeds[mechanics.places[i][0]])]
-    kept += [view.speeds[row] for k, i in enumerate(closed) if case.sticks(k) for row in mechanics.places[i][1:] if row]
+    kept += [
+        view.speeds[row]
+        for k, i in enumerate(closed)
+        if case.sticks(k)
+        for row in mechanics.places[i][1:]
+        if row
+    ]
     return Held(field, expressed(kept), normal, tangential, frozenset(unknown))
 
 
@@ -100,9 +107,7 @@ def _slip_drawn_back(mechanics: Mechanics, i: int, pace: float) -> Expression:
     return ZERO if row is None else -pace * mechanics.view.speeds[row]
 
 
-def _pace(
-    space: Space, accelerations: Sequence[Any], place: tuple[float, np.ndarray, np.ndarray]
-) -> float:
+def _pace(space: Space, accelerations: Sequence[Any], place: tuple[float, np.ndarray, np.ndarray]) -> float:
     """How fast a motion changes: the largest eigenvalue of its linearisation, as a power of two."""
     t, x, parameters = place
     n = space.size

@@ -132,9 +132,7 @@ def outcome(
     solution = solved_in_numbers(rows, right) if numbers is None else solved(rows, [right], numbers)[0]
     if solution is None:
         return None
-    forces = [
-        first + dot([column[row] for column in unknowns], solution) for row, first in enumerate(start)
-    ]
+    forces = [first + dot([column[row] for column in unknowns], solution) for row, first in enumerate(start)]
     after = [speed + dot(row, forces) for speed, row in zip(level.before, level.delassus, strict=True)]
     for row, target in wanted:
         after[row] = target

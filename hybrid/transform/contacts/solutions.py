@@ -23,9 +23,7 @@ class Found:
     outcome: Outcome
 
 
-def consistent(
-    level: Level, options: Sequence[Sequence[str]], stuck: Sequence[int]
-) -> list[Found]:
+def consistent(level: Level, options: Sequence[Sequence[str]], stuck: Sequence[int]) -> list[Found]:
     """The consistent cases of a problem in numbers, those with fewest forces first.
 
     Parameters

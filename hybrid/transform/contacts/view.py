@@ -67,8 +67,8 @@ class View:
     def listed(self) -> list[Any]:
         """All entries in one list."""
         found: list[Any] = []
-        for name in self.__attrs_attrs__:  # type: ignore[attr-defined]
-            for each in getattr(self, name.name):
+        for name in attrs.asdict(self, recurse=False):
+            for each in getattr(self, name):
                 found += each if isinstance(each, list) else [each]
         return found
 
@@ -76,11 +76,11 @@ class View:
         """The view with other entries, in the order of ``listed``."""
         source = iter(values)
         made = []
-        for name in self.__attrs_attrs__:  # type: ignore[attr-defined]
+        for name in attrs.asdict(self, recurse=False):
             made.append(
                 [
                     [next(source) for _ in each] if isinstance(each, list) else next(source)
-                    for each in getattr(self, name.name)
+                    for each in getattr(self, name)
                 ]
             )
         return View(*made)
@@ -129,12 +129,8 @@ class Mechanics:
             gaps=[each.gap for each in self.contacts],
             speeds=[row.speed(u) for row in self.rows],
             accelerations=[node(dot(row.weights, free)) + row.bias for row in self.rows],
-            fast=[
-                _length(delassus[i][i], energy) + Absolute(row.drift) for i, row in enumerate(self.rows)
-            ],
-            strong=[
-                _length(delassus[i][i], effort) + Absolute(row.bias) for i, row in enumerate(self.rows)
-            ],
+            fast=[_length(delassus[i][i], energy) + Absolute(row.drift) for i, row in enumerate(self.rows)],
+            strong=[_length(delassus[i][i], effort) + Absolute(row.bias) for i, row in enumerate(self.rows)],
             restitution=[each.restitution for each in self.contacts],
             friction=[each.friction for each in self.contacts],
             static=[each.static for each in self.contacts],
@@ -174,9 +170,10 @@ class Mechanics:
         """The rows of some contacts."""
         return [row for i in contacts for row in self.places[i] if row is not None]
 
-    def gap_of(self, view: View, row: int) -> Any:
-        """The gap of a normal direction; zero for a tangential one."""
-        return next((view.gaps[i] for i, (own, _) in enumerate(self.places) if own == row), 0.0)
+    def closing(self, view: View, contacts: Sequence[int]) -> Level:
+        """The problem of moving the coordinates so that gaps are closed."""
+        gaps = [each for i in contacts for each in [view.gaps[i], *[0.0] * (len(self.contacts[i].rows) - 1)]]
+        return attrs.evolve(self.forces(view, contacts), before=gaps)
 
     def impacts(self, view: View, contacts: Sequence[int], restitution: Sequence[Any]) -> Level:
         """The problem of velocities of some contacts, each with a coefficient of restitution.
@@ -202,8 +199,8 @@ class Mechanics:
         rows = self.rows_of(contacts)
         delassus = [[view.delassus[row][column] for column in rows] for row in rows]
         places = [
-            (rows.index(self.places[i][0]), None if self.places[i][1] is None else rows.index(self.places[i][1]))
-            for i in contacts
+            (rows.index(normal), None if across is None else rows.index(across))
+            for normal, across in (self.places[i] for i in contacts)
         ]
         return Level(
             places=places,
