@@ -70,8 +70,10 @@ class Happening:
         state: list[Expression] | None = None
         if self.event.kind in SUDDEN:
             conditions += [*self._closed(), *self._approaching()]
-            last, forces = self._impact(numbers, conditions)
-            conditions += self._slid() if self.event.kind == SETTLES else self._parted(*last)
+            asked: list[Expression] = []
+            last, forces = self._impact(numbers, asked)
+            asked += self._slid() if self.event.kind == SETTLES else self._parted(*last)
+            conditions += [] if self.judge.is_bounce(self.event, decision.closed) else asked
             velocities = view.moved(forces, self.mechanics.rows_of(decision.closed), view.velocities)
             state = [*self._coordinates(numbers), *map(node, velocities)]
             t, x, parameters = place

@@ -139,7 +139,9 @@ class Judge:
             x = np.array([*x[: len(velocities)], *velocities])
             rows = [level.row(k) for k in range(len(closed))]
             resting = [
-                i for i, row in zip(closed, rows, strict=True) if after[row] <= NOISE * level.noise[row]
+                i
+                for i, row in zip(closed, rows, strict=True)
+                if after[row] <= NOISE * level.noise[row] and not self.is_bounce(event, closed)
             ]
             moving = self.mechanics.at(t, x, parameters)
             sliding = [
@@ -153,6 +155,16 @@ class Judge:
             ]
         parts = tuple(closed), tuple(approaching), impulses
         return self._rest(event, statuses, parts, moving, resting, sliding)
+
+    def is_bounce(self, event: Event, closed: Sequence[int]) -> bool:
+        """Whether an impact is one of a single contact without friction, which nothing needs to be asked of.
+
+        It leads to flight; where it takes all speed it is the limit of a chatter, which is over at once.
+        """
+        if event.kind != IMPACT or len(closed) != 1:
+            return False
+        [only] = closed
+        return self.mechanics.contacts[only].restitution != 0 and not self.contact(only).has_friction
 
     def first_phase(self, view: View, closed: Sequence[int], approaching: Sequence[int]) -> Level:
         """The problem of the velocities of an impact; by Poisson's law of its compression."""

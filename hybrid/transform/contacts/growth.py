@@ -354,6 +354,7 @@ class ContactGrowth:
         """Gap and forces of each contact, in the modes that have been made."""
         found = {}
         modes = [(each.mode.name, each.forces) for each in self.made.values()]
+        modes.append((SETTLING, modes[0][1]))
         for i, contact in enumerate(self.contacts):
             for what in FORCES if contact.has_friction else FORCES[:1]:
                 name = f"{contact.name}.{what}"
