@@ -32,7 +32,7 @@ from hybrid.simulation.plan import Plan, check_solver, plan_of
 from hybrid.solvers import Solver
 from hybrid.system.entries import has_age
 from hybrid.system.graph import HybridSystem, as_system, starting_mode
-from hybrid.system.growth import Unexplored
+from hybrid.system.growth import Unexplored, stage_of
 from hybrid.transform.aged import aged, with_age
 
 
@@ -107,7 +107,7 @@ def explore(
     if growth is None:
         return mode
     # A run on a later stage of the system may have told the mode.
-    later = mode not in system.mode_names and mode in growth.current.mode_names
+    later = mode not in system.mode_names and mode in stage_of(system).mode_names
     if later or growth.place(t0, state, values, mode):
         raise Unexplored(mode)
     return growth.mode_at(t0, state, values, mode)

@@ -34,6 +34,7 @@ from hybrid.sweep.local import cores
 from hybrid.sweep.outcome import text_of
 from hybrid.sweep.sheet import UNTOUCHED, flags
 from hybrid.system.graph import HybridSystem, as_system, starting_mode
+from hybrid.system.growth import stage_of
 
 if TYPE_CHECKING:
     import xarray
@@ -125,7 +126,7 @@ def simulate_many(
         run_in_blocks(work.run, len(origins), threads, bar)
         # An interrupt that came too late to stop anything is not raised either.
         CTRL_C.is_set()
-    grown = system if system.growth is None else system.growth.current
+    grown = stage_of(system)
     table = found.outputs(grown, asked, grown.parameter_values(parameters))
     tables: dict[str, Any] = {"outputs_end": (("start",), table[:, -1])}
     if len(times):

@@ -26,7 +26,7 @@ from hybrid.sweep.points import as_points
 from hybrid.sweep.sheet import Labels
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, as_system, check_mode, starting_mode
-from hybrid.system.growth import Unexplored
+from hybrid.system.growth import Unexplored, stage_of
 from hybrid.system.labels import by_label, plain_name
 from hybrid.system.members import shared_names
 from hybrid.transform.aged import aged, with_age, without_age
@@ -76,7 +76,7 @@ class Rows:
         growth = self.system.growth
         while growth is not None:
             try:
-                return work(self._with(growth.current))
+                return work(self._with(stage_of(self.system)))
             except Unexplored:
                 continue
         return work(self)

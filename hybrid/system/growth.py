@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import wraps
+from types import MappingProxyType
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
 
+import attrs
 import numpy as np
 
 from hybrid.arguments import misplaced_refusal, misplaced_tolerances
@@ -69,6 +71,54 @@ class Growth(Protocol):
         ...
 
 
+class Finished:
+    """The growth of a system that is made from one stage of another, and stays as it is.
+
+    Transitions that stood for modes to be made end its runs.
+    """
+
+    original = None
+    told: Mapping[str, str] = MappingProxyType({})
+    ambiguous: Mapping[str, str] = MappingProxyType({})
+
+    @property
+    def written(self) -> dict[Any, Any]:
+        """Nothing: what is made from the stage has functions of its own."""
+        return {}
+
+    @property
+    def current(self) -> None:
+        """The system that has this growth."""
+        return None
+
+    def leads_on(self, transition: str) -> bool:
+        """Any transition that ends a run may have stood for modes to be made."""
+        return True
+
+    def extend(self, transition: str, place: Place) -> bool:
+        """Nothing is made."""
+        return False
+
+    def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
+        """Nothing is made."""
+        return False
+
+    def mode_at(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> str | None:
+        """The mode that a run is asked to start in."""
+        return mode
+
+
+def finished(system: Any) -> Any:
+    """A system with the modes that it has; nothing that is made from it has more."""
+    return system if system.growth is None else attrs.evolve(system, growth=Finished())
+
+
+def stage_of(system: Any) -> Any:
+    """The latest stage of a system that grows; others are their own."""
+    found = None if system.growth is None else system.growth.current
+    return system if found is None else found
+
+
 def grows(value: object) -> bool:
     """Whether an object can make further modes of a system."""
     methods = ("leads_on", "extend", "place")
@@ -95,7 +145,7 @@ def growing(function: Callable[Concatenate[Any, P], R]) -> Callable[Concatenate[
         growth = None if isinstance(system, type) else getattr(system, "growth", None)
         while growth is not None:
             try:
-                return function(growth.current, *args, **kwargs)
+                return function(stage_of(system), *args, **kwargs)
             except Unexplored:
                 continue
         return function(system, *args, **kwargs)

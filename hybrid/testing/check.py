@@ -19,6 +19,7 @@ from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
 from hybrid.solvers import Solver
 from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.growth import finished, stage_of
 from hybrid.system.labels import named
 from hybrid.system.laws import Elastic, Laws
 from hybrid.testing.case import TIGHT, Case
@@ -187,7 +188,8 @@ def check_system(
         # The modes of a system that is made in stages are those that these runs need.
         if system.growth is None or system.growth.current is system:
             break
-        system = system.growth.current
+        system = stage_of(system)
+    system = finished(system)
     flip = None if laws.elastic is None else turned("elastic", system, laws.elastic)
     tally = _Tally(coverage, _properties(system, laws, flip), law_checks(laws))
     tally.once(READS, lambda: check_reads(attrs.evolve(system, laws=laws)))

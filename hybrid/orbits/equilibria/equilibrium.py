@@ -17,6 +17,7 @@ from hybrid.orbits.equilibria.equations import Equations, reduced, sizes_of
 from hybrid.orbits.equilibria.smooth import row_lengths
 from hybrid.simulation.labelled import Names, attributes, with_outputs
 from hybrid.simulation.quantities import Asked, table_of
+from hybrid.simulation.trajectory import explore
 from hybrid.status import SUCCESS, Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system, check_mode
 from hybrid.system.growth import growing
@@ -201,6 +202,7 @@ def equilibrium(
     state = system.variables.state_values("x0", x0)
     vector = system.parameter_values(parameters)
     most = arguments.count("max_iterations", max_iterations, 0)
+    mode = explore(system, 0.0, state, vector, mode)
     if mode is not None:
         check_mode(system, mode)
         parts = [system.mode_names[i] for i in system.parts_of(mode)]
