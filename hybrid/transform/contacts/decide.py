@@ -144,10 +144,10 @@ class Judge:
                 if after[row] <= NOISE * level.noise[row] and not self.is_bounce(event, closed)
             ]
             moving = self.mechanics.at(t, x, parameters)
-            sliding = [
-                0 if event.kind == SETTLES and closed.index(i) in still else self._sliding(moving, i)
-                for i in resting
-            ]
+            places = [level.places[closed.index(i)][1] for i in resting]
+            sliding = [0 if row is None else _sign(after[row], level.noise[row]) for row in places]
+            if event.kind == SETTLES:
+                sliding = [0 if closed.index(i) in still else self._sliding(moving, i) for i in resting]
         else:
             moving, resting = view, [*closed]
             sliding = [
@@ -297,9 +297,7 @@ class Judge:
 
     def _sliding(self, view: View, i: int) -> int:
         row = self.mechanics.places[i][1]
-        if row is None or abs(view.speeds[row]) <= NOISE * view.fast[row]:
-            return 0
-        return 1 if view.speeds[row] > 0 else -1
+        return 0 if row is None else _sign(view.speeds[row], view.fast[row])
 
     def _options(self, event: Event, statuses: Statuses, i: int, sliding: int) -> tuple[str, ...]:
         if sliding:
@@ -319,6 +317,11 @@ class Judge:
             if each == OPEN and is_implied(level, row, pushing):
                 statuses[k] = IDLE
         return attrs.evolve(case, statuses=tuple(statuses))
+
+
+def _sign(speed: float, noise: float) -> int:
+    """The sign of a speed, 0 for one that is rounding: what counts as one is its ``noise``."""
+    return 0 if abs(speed) <= NOISE * noise else 1 if speed > 0 else -1
 
 
 def _size(value: Any) -> Any:

@@ -1,0 +1,91 @@
+"""Dry friction at contacts: sticking, slipping, static friction, and where Coulomb's law has no answer."""
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid import simulate
+from tests.hybrid.transform.contacts.scenes import G, block, rod
+
+
+class TestBlock:
+    def test_slides_until_it_sticks(self):
+        arc = simulate(block(), (0.0, 0.0, 2.0, 0.0), (0.0, 2.0))
+        stop = 2.0 / (0.3 * G)
+        assert arc.mode[0] == "floor slips +"
+        assert arc.mode[-1] == "floor sticks"
+        assert arc.jumps["floor stops"][0].t == pytest.approx(stop, abs=1e-13)
+        assert arc["x"][-1] == pytest.approx(2.0 / 2.0 * stop, abs=1e-12)
+        assert arc["floor.tangential"][0] == pytest.approx(-0.3 * G)
+
+    @pytest.mark.parametrize(("tilt", "mode"), [(0.29, "floor sticks"), (0.30, "floor slips +")])
+    def test_stays_on_a_slope_up_to_the_angle_of_friction(self, tilt, mode):
+        """The angle of friction is atan(0.3) = 0.2915."""
+        arc = simulate(block(), (0.0, 0.0, 0.0, 0.0), (0.0, 2.0), parameters={"tilt": tilt})
+        assert set(arc.mode) == {mode}
+        slides = max(np.sin(tilt) - 0.3 * np.cos(tilt), 0.0) if mode != "floor sticks" else 0.0
+        assert arc["x"][-1] == pytest.approx(2.0 * G * slides, abs=1e-12)
+
+    def test_stick_slip_on_a_belt(self):
+        """The belt carries the block until the spring pulls it loose; then it swings about its rest."""
+        values = {"k": 4.0, "belt": 0.5, "mu": 0.3}
+        arc = simulate(block(static=0.5), (0.0, 0.0, 0.5, 0.0), (0.0, 6.0), parameters=values)
+        loose, centre, omega = 0.5 * G / 4.0, 0.3 * G / 4.0, 2.0
+        first = arc.jumps["floor slips"][0].t
+        assert first == pytest.approx(loose / 0.5, abs=1e-12)
+        angle = np.arctan2(0.5 / omega, loose - centre)
+        assert arc.jumps["floor stops"][0].t - first == pytest.approx((np.pi + 2.0 * angle) / omega, abs=1e-10)
+
+    def test_sticks_at_once_where_a_fall_ends(self):
+        arc = simulate(block(), (0.0, 1.0, 1.0, 0.0), (0.0, 3.0), parameters={"e": 0.5, "mu": 0.3})
+        assert arc.status.ok
+        assert arc.mode[-1] == "floor sticks"
+        # The first impact has enough friction to end the slip.
+        assert arc.jumps["floor"][0].x_plus[2] == pytest.approx(0.0, abs=1e-13)
+
+    def test_friction_that_a_call_sets_to_zero(self):
+        arc = simulate(block(), (0.0, 0.0, 2.0, 0.0), (0.0, 2.0), parameters={"mu": 0.0})
+        assert arc["x"][-1] == pytest.approx(4.0, abs=1e-12)
+
+    def test_static_friction_below_kinetic(self):
+        with pytest.raises(hybrid.ModelError, match="no smaller than"):
+            block(friction=0.5, static=0.3)
+
+
+class TestPainleve:
+    """A rod that slides on its tip: with much friction no acceleration, or several, obey Coulomb's law."""
+
+    start = (0.0, np.sin(0.9), 0.9)
+
+    def test_no_acceleration_is_consistent(self):
+        """Slipping to the left, the tip digs in: 1 + 3 c^2 + 3 mu s c is negative there."""
+        arc = simulate(rod(3.0), (*self.start, -5.0, 0.0, 0.0), (0.0, 1.0))
+        assert arc.status.code == hybrid.StatusCode.TERMINAL
+        assert arc.jumps[-1].transition == "painleve"
+        assert "'tip'" in arc.status.message
+        assert arc.jumps[-1].t == 0.0
+
+    def test_it_is_well_posed_with_less_friction(self):
+        arc = simulate(rod(0.3), (*self.start, -5.0, 0.0, 0.0), (0.0, 0.1))
+        assert arc.status.ok
+        assert set(arc.mode) == {"tip slips -"}
+
+    def test_the_other_direction_is_well_posed(self):
+        arc = simulate(rod(3.0), (*self.start, 5.0, 0.0, 0.0), (0.0, 0.1))
+        assert arc.status.ok
+        assert set(arc.mode) == {"tip slips +"}
+
+    def test_forces_by_hand(self):
+        """``l = (g - s w^2) / (1 + 3 c (c - mu s))`` for a slip to the left at the start."""
+        arc = simulate(rod(0.3), (*self.start, -5.0, 0.0, 0.0), (0.0, 0.1))
+        s, c = np.sin(0.9), np.cos(0.9)
+        assert arc["tip.normal"][0] == pytest.approx(G / (1.0 + 3.0 * c * (c - 0.3 * s)), abs=1e-10)
+
+    def test_several_are_told_and_named(self):
+        """A rod that would rise meets neither: it flies, or it digs in."""
+        spin = 6.0
+        start = (*self.start, -5.0 - np.sin(0.9) * spin, np.cos(0.9) * spin, spin)
+        with pytest.raises(hybrid.ArgumentError, match="'free' or 'tip slips -'"):
+            simulate(rod(3.0), start, (0.0, 1.0))
+        arc = simulate(rod(3.0), start, (0.0, 0.01), mode="free")
+        assert arc.mode[0] == "free"
