@@ -23,8 +23,8 @@ from hybrid.status import Status
 from hybrid.sweep.rows import At, Place, Rows, rows_of
 from hybrid.sweep.sheet import Labels
 from hybrid.transform.aged import aged, without_age
-from lyapunov.directions import first_vectors, number_of_exponents
-from lyapunov.spectrum import Estimates, Flight, Means, interval_length, orthonormal_at_start
+from lyapunov.directions import first_vectors, number_of_exponents, orthonormal_at_start
+from lyapunov.spectrum import Estimates, Flight, Means, interval_length
 from lyapunov.together import alike, means_together, result_of
 
 if TYPE_CHECKING:

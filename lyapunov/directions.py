@@ -5,11 +5,16 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+from scipy.linalg import qr
 
 from hybrid import HybridSystem, arguments, compile_system
 from hybrid.simulation.plan import check_solver
+from hybrid.simulation.trajectory import Trajectory
 from hybrid.solvers import Solver
 from hybrid.transform.aged import aged, least_dimension
+
+# A direction of which less than this share is left is one that the mode does not allow.
+LEAST_SHARE = 1e-8
 
 
 def number_of_exponents(system: HybridSystem, k: int | None) -> int:
@@ -36,3 +41,16 @@ def generic_directions(n: int, k: int) -> np.ndarray:
     # Read-only, because the cache returns the same array to every caller.
     directions.flags.writeable = False
     return np.asarray(directions[:, :k])
+
+
+def orthonormal_at_start(trajectory: Trajectory) -> None:
+    """Make the tangent vectors of a run orthonormal again where its mode has taken some directions from them.
+
+    If there are more vectors than directions, the last ones are zero: their exponents are minus infinity.
+    """
+    if trajectory.system.age is None and not trajectory.holds:
+        return
+    trajectory.replace_tangents(trajectory.tangent_matrix)
+    directions, sizes, _ = qr(trajectory.tangent_matrix, mode="economic", pivoting=True)
+    kept = np.abs(np.diag(sizes)) > LEAST_SHARE * np.abs(sizes[0, 0])
+    trajectory.replace_tangents(directions * kept)

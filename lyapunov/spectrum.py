@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import attrs
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import qr
 
 from hybrid import ArgumentError, HybridSystem, Status, arguments
 from hybrid.accuracy.averages import (
@@ -36,7 +35,12 @@ from hybrid.status import SUCCESS
 from hybrid.system.growth import growing
 from hybrid.transform.aged import least_dimension, original_of, without_age
 from lyapunov.batches import EMPTY, closed_batch_means
-from lyapunov.directions import first_vectors, generic_directions, number_of_exponents
+from lyapunov.directions import (
+    first_vectors,
+    generic_directions,
+    number_of_exponents,
+    orthonormal_at_start,
+)
 from lyapunov.interval import INTERVALS_AT_ONCE, growths_layout
 from lyapunov.per_transition import JumpRates, PerTransition
 
@@ -46,9 +50,6 @@ if TYPE_CHECKING:
 # Rounding of the time may be at most this share of an interval.
 FINEST_INTERVAL = 2.0**-10
 JUMPS_AND_STEPS = [COUNTERS.index("jumps"), COUNTERS.index("steps")]
-
-# A direction of which less than this share is left is one that the mode does not allow.
-LEAST_SHARE = 1e-8
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -281,19 +282,6 @@ def lyapunov_spectrum(
     )
     estimates.release()
     return spectrum
-
-
-def orthonormal_at_start(trajectory: Trajectory) -> None:
-    """Make the tangent vectors of a run orthonormal again where its mode has taken some directions from them.
-
-    If there are more vectors than directions, the last ones are zero: their exponents are minus infinity.
-    """
-    if trajectory.system.age is None and not trajectory.holds:
-        return
-    trajectory.replace_tangents(trajectory.tangent_matrix)
-    directions, sizes, _ = qr(trajectory.tangent_matrix, mode="economic", pivoting=True)
-    kept = np.abs(np.diag(sizes)) > LEAST_SHARE * np.abs(sizes[0, 0])
-    trajectory.replace_tangents(directions * kept)
 
 
 def interval_length(trajectory: Trajectory, interval: float | None, intervals: int) -> float:

@@ -36,7 +36,12 @@ DEFAULTS = {
     hybrid.After: {"when": None, "restarts": True},
     hybrid.Delay: {"places": 8, "when": None},
     hybrid.Guard: {"direction": 0, "gradient": None, "when": None, "at_start": False},
-    hybrid.Mode: {"jacobian": None, "part_of": None},
+    hybrid.Mode: {"jacobian": None, "holds": None, "part_of": None},
+    hybrid.Contact: {"restitution": 0.0, "friction": 0.0, "slip": None, "static": None},
+    hybrid.mechanics: {
+        **{"mass": None, "forces": None, "kinetic": None, "potential": None, "impacts": "newton"},
+        **{"together": 1e-9, "start": None, **PLAIN},
+    },
     hybrid.Reset: {"jacobian": None},
     hybrid.Table: {"y": None, "kind": "linear", "unit": None, "origin": None},
     hybrid.Transition: {"reset": None, "accumulates_to": None, "part_of": None},

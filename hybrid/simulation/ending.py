@@ -215,8 +215,8 @@ def _impacts_in_doubt(trajectory: Trajectory) -> Status | None:
     contacts = " and ".join(dict.fromkeys(growth.ambiguous[name] for name in fired))
     return Status(
         StatusCode.AMBIGUOUS_ORDER,
-        f"Contacts closed together, {contacts}: their impacts were solved at once, and one after another they "
-        "would lead elsewhere, by their order.",
+        f"Contacts closed together, {contacts}: their impacts were solved at once, and one after another "
+        "they would lead elsewhere, by their order.",
         'Start beside this case, or say mechanics(impacts="sequential"): the contact listed first is first.',
     )
 

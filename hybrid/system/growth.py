@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import wraps
-from types import MappingProxyType
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
 
 import attrs
@@ -42,12 +41,12 @@ class Growth(Protocol):
     @property
     def told(self) -> Mapping[str, str]:
         """By transition: why a run ends there, in words."""
-        ...
+        return {}
 
     @property
     def ambiguous(self) -> Mapping[str, str]:
         """By transition: names of what happens there at once, if another order would lead elsewhere."""
-        ...
+        return {}
 
     @property
     def current(self) -> Any:
@@ -68,23 +67,19 @@ class Growth(Protocol):
 
     def mode_at(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> str | None:
         """The mode in which a run starts that is asked to start in ``mode``; None if the guards tell it."""
-        ...
+        return mode
 
 
-class Finished:
+class Finished(Growth):
     """The growth of a system that is made from one stage of another, and stays as it is.
 
     Transitions that stood for modes to be made end its runs.
     """
 
     original = None
-    told: Mapping[str, str] = MappingProxyType({})
-    ambiguous: Mapping[str, str] = MappingProxyType({})
 
-    @property
-    def written(self) -> dict[Any, Any]:
-        """Nothing: what is made from the stage has functions of its own."""
-        return {}
+    def __init__(self) -> None:
+        self.written: dict[Any, Any] = {}
 
     @property
     def current(self) -> None:
@@ -102,10 +97,6 @@ class Finished:
     def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
         """Nothing is made."""
         return False
-
-    def mode_at(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> str | None:
-        """The mode that a run is asked to start in."""
-        return mode
 
 
 def finished(system: Any) -> Any:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import reduce
+
 import attrs
 
+from hybrid.expression.evaluation import scalar
 from hybrid.expression.graph import contains
 from hybrid.expression.nodes import Expression
+from hybrid.expression.operations import And
 from hybrid.expression.switches import SWITCHING
 from hybrid.expression.tracing import TraceError, model_symbols, trace
-from hybrid.system.elements import Transition
+from hybrid.system.elements import Function, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.variables import Variables
 from hybrid.transform.cells import Cell
@@ -61,3 +66,8 @@ def _reset(transition: Transition, variables: Variables) -> list[Expression] | N
         return trace(reset, variables.components, variables.parameter_names)
     except TraceError:
         return None
+
+
+def all_of(conditions: Sequence[Expression]) -> Function | None:
+    """The condition that all of several hold; None for none."""
+    return scalar(reduce(And, conditions)) if conditions else None

@@ -6,14 +6,18 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from hybrid import arguments
-from hybrid.errors import ModelError
+from hybrid.errors import HybridError, ModelError
 from hybrid.system.elements import Function, Mode
 from hybrid.system.graph import HybridSystem
 from hybrid.system.laws import Laws
+from hybrid.system.outputs import as_outputs
 from hybrid.system.variables import Variables, as_parameters, as_state
 from hybrid.system.watched import Watched
 from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.contacts.statuses import FREE
+
+# What coordinates and velocities are.
+NAMES = "be names that can be written as attributes, one or several"
 
 
 def mechanics(
@@ -38,9 +42,10 @@ def mechanics(
 ) -> HybridSystem:
     """The hybrid system of bodies with unilateral contacts and dry friction.
 
-    The equations of motion ``M a = h`` follow from masses and forces, or from energies by Lagrange's equations.
-    Which contacts are closed, stick or slip, what an impact does and which mode follows is derived from the gaps
-    (see Notes). The result is an ordinary `HybridSystem`, whose modes are made when a run first needs them.
+    The equations of motion ``M a = h`` follow from masses and forces, or from energies by Lagrange's
+    equations. Which contacts are closed, stick or slip, what an impact does and which mode follows is derived
+    from the gaps (see Notes). The result is an ordinary `HybridSystem`, whose modes are made when a run first
+    needs them.
 
     Parameters
     ----------
@@ -71,21 +76,23 @@ def mechanics(
     HybridSystem
         Modes are named by what holds: ``free``, ``left``, ``left sticks``, ``left slips +``, ``left+right``.
         Outputs ``left.gap``, ``left.normal``, ``left.tangential`` are the gap and the contact forces.
-        ``arc.jumps["left"]`` are the impacts of a contact. A run ends (TERMINAL) with a jump ``painleve`` where no
-        accelerations agree with Coulomb's law, and with ``not unique`` where several do.
+        ``arc.jumps["left"]`` are the impacts of a contact. A run ends (TERMINAL) with a jump ``painleve``
+        where no accelerations agree with Coulomb's law, and with ``not unique`` where several do.
 
     Raises
     ------
     ModelError
         If a function cannot be traced or has the wrong number of values, the mass matrix is not symmetric and
-        positive definite, the kinetic energy is not quadratic in the velocities, or a slip is not affine in them.
+        positive definite, the kinetic energy is not quadratic in the velocities, or a slip is not affine in
+        them.
 
     Notes
     -----
-    *Impacts*: with ``u' = u + M^-1 W f``, each closed contact has an impulse ``f >= 0`` or a rate after the impact
-    that is larger than ``-e`` times the one before, and Coulomb's law holds for the impulses (Moreau). *Forces*:
-    each closed contact whose rate is zero has a force ``f >= 0`` or an acceleration of its gap, and Coulomb's law
-    holds. All cases are tried at the state at which this is asked, so that none and several are seen.
+    *Impacts*: with ``u' = u + M^-1 W f``, each closed contact has an impulse ``f >= 0`` or a rate after the
+    impact that is larger than ``-e`` times the one before, and Coulomb's law holds for the impulses (Moreau).
+    *Forces*: each closed contact whose rate is zero has a force ``f >= 0`` or an acceleration of its gap, and
+    Coulomb's law holds. All cases are tried at the state at which this is asked, so that none and several are
+    seen.
 
     References
     ----------
@@ -116,11 +123,14 @@ def mechanics(
     from hybrid.transform.contacts.view import Mechanics
 
     q, u = (_names(what, value) for what, value in (("coordinates", coordinates), ("velocities", velocities)))
-    if len(q) != len(u) or not q:
+    if len(q) != len(u):
         raise ModelError(
-            f"mechanics: velocities are the rates of coordinates, one for each; got {len(q)} coordinates and "
-            f"{len(u)} velocities."
+            "mechanics: coordinates and velocities must be as many, since these are the rates of those; got "
+            f"{len(q)} and {len(u)}."
         )
+    for what, given in (("mass", mass), ("forces", forces), ("kinetic", kinetic), ("potential", potential)):
+        if given is not None:
+            arguments.function(f"mechanics: {what}", given, "(t, x, p)")
     arguments.one_of("mechanics: impacts", impacts, LAWS)
     touching = tuple(
         arguments.items("mechanics: contacts", contacts, "be a list of Contact objects", least=1)
@@ -146,7 +156,7 @@ def mechanics(
         name=name,
         units={} if units is None else units,
         angles={} if angles is None else angles,
-        outputs={**({} if outputs is None else outputs), **system.outputs},
+        outputs={**as_outputs({} if outputs is None else outputs, "mechanics"), **system.outputs},
         laws=Laws() if laws is None else laws,
         derived_from=Watched([each for each in functions if callable(each)]),
     )
@@ -155,7 +165,10 @@ def mechanics(
 
 def _names(what: str, value: Iterable[str]) -> tuple[str, ...]:
     """Names of coordinates or of velocities."""
-    names = as_state(value if isinstance(value, str) else tuple(value))
-    if isinstance(names, int):
-        raise arguments.refusal(f"mechanics: {what}", "be names", value)
-    return names
+    names = arguments.items(f"mechanics: {what}", value, NAMES, least=1)
+    try:
+        found = as_state(tuple(names))
+    except HybridError:
+        raise arguments.refusal(f"mechanics: {what}", NAMES, value) from None
+    assert not isinstance(found, int), "names are not their number"
+    return found

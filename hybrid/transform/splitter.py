@@ -26,10 +26,10 @@ from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.functions import field_function, moving_field
 from hybrid.system.graph import HybridSystem, watched_by
-from hybrid.system.growth import Place
+from hybrid.system.growth import Growth, Place
 from hybrid.transform import corners, rests
 from hybrid.transform.cells import Cell, Choice, Pieces
-from hybrid.transform.edges import Edge, Outgoing
+from hybrid.transform.edges import Edge, Outgoing, all_of
 from hybrid.transform.landings import landed, on_side
 from hybrid.transform.naming import Names, copy_name
 from hybrid.transform.ticks import timed
@@ -43,7 +43,7 @@ SIZES = (0.1, 1.0, 10.0)
 MOST_WHOLE = 12
 
 
-class Splitter:
+class Splitter(Growth):
     """Makes the modes and transitions of the split system, cell by cell."""
 
     def __init__(self, system: HybridSystem, modes: Mapping[str, Any] | None = None) -> None:
@@ -51,8 +51,6 @@ class Splitter:
         self.watched = watched_by(system)
         self.lock = RLock()
         self.written: dict[Any, Any] = {}
-        self.told: dict[str, str] = {}
-        self.ambiguous: dict[str, str] = {}
         self.heights: dict[int, Function] = {}
         self.variables = system.variables
         self.symbols = model_symbols(system.dimension, len(system.parameters))
@@ -100,7 +98,7 @@ class Splitter:
         return transition in self.frontier
 
     def extend(self, transition: str, place: Place) -> bool:
-        """Make the mode to which a transition leads."""
+        """Make the mode to which a transition leads; the place does not matter."""
         with self.lock:
             self._make([self.frontier[transition]], 1)
         return True
@@ -118,13 +116,10 @@ class Splitter:
             self._make(missing, len(missing))
         return bool(missing)
 
-    def mode_at(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> str | None:
-        """The mode that a run is asked to start in: the guards tell which part it is."""
-        return mode
-
     def _values(self, t: float, x: np.ndarray, parameters: np.ndarray) -> dict[Symbol, float]:
-        symbols = (self.symbols.t, *self.symbols.x, *self.symbols.p)
-        return dict(zip(symbols, (t, *x, *parameters), strict=True))
+        return dict(
+            zip((self.symbols.t, *self.symbols.x, *self.symbols.p), (t, *x, *parameters), strict=True)
+        )
 
     def _cell_at(self, pieces: Pieces, values: dict[Symbol, float]) -> Cell:
         """The cell in which a point lies; above the surfaces that it lies on."""
@@ -252,7 +247,7 @@ class Splitter:
             if pieces.rests(sides, number):
                 for resting in pieces.choices({**sides, number: 0}):
                     more = [*extra, *self._on(resting.chosen)]
-                    yield self._edge(cell, resting.cell, Guard(height, -side, when=_all(more)))
+                    yield self._edge(cell, resting.cell, Guard(height, -side, when=all_of(more)))
                 continue
             joined = free and not corners.are_apart(pieces, sides, [*free, number])
             passes = not pieces.jumps(sides, number) or not (joined or pieces.may_attract(sides, number))
@@ -260,7 +255,7 @@ class Splitter:
             if time or not passes:
                 yield self._edge(cell, choice.cell, self._at_start(number, side, extra))
             if passes:
-                yield self._edge(cell, choice.cell, attrs.evolve(crossing, when=_all(extra)), limit=limit)
+                yield self._edge(cell, choice.cell, attrs.evolve(crossing, when=all_of(extra)), limit=limit)
                 continue
             if joined:
                 turns = True
@@ -270,19 +265,19 @@ class Splitter:
             arrives, crosses = up if side < 0 else down
             for sliding in pieces.choices({**sides, number: 0}):
                 more = [self._condition(arrives), *extra, *self._on(sliding.chosen)]
-                yield self._edge(cell, sliding.cell, Guard(height, -side, when=_all(more)))
+                yield self._edge(cell, sliding.cell, Guard(height, -side, when=all_of(more)))
             onwards = [self._condition(crosses), *extra]
-            yield self._edge(cell, choice.cell, Guard(height, -side, when=_all(onwards)), limit=limit)
+            yield self._edge(cell, choice.cell, Guard(height, -side, when=all_of(onwards)), limit=limit)
         if turns:
             yield from self._turns(cell, crossing, corners.arrivals(free, number, side))
 
     def _at_start(self, number: int, side: int, extra: list[Expression]) -> Guard:
         """The guard that excludes a start on the wrong side of a surface."""
         if timed(self.surfaces, number) is None:
-            return Guard(self._height(number), -side, when=_all(extra), at_start=True)
+            return Guard(self._height(number), -side, when=all_of(extra), at_start=True)
         # A tick at the start does not fire, so its instant belongs to one side: no rounding is allowed for.
         beyond = [*self._on([(number, -side)]), *extra]
-        return Guard(scalar(Number(-side)), -side, when=_all(beyond), at_start=True)
+        return Guard(scalar(Number(-side)), -side, when=all_of(beyond), at_start=True)
 
     def _turns(
         self, cell: Cell, guard: Guard | Clock, ways: Sequence[corners.Corner], leaving: int = -1
@@ -304,10 +299,10 @@ class Splitter:
                     continue
                 when = corners.consistent(pieces, sides, [*corner], leaving if k == 0 else None)
                 possible.append(reduce(And, [*when, *self._on(choice.chosen)]))
-                fires = attrs.evolve(cast(Any, guard), when=_all([*asked, possible[-1]]))
+                fires = attrs.evolve(cast(Any, guard), when=all_of([*asked, possible[-1]]))
                 yield self._edge(cell, choice.cell, fires, reset)
         where = self.names.cell(self.surfaces.known, [(number, 0) for number in ways[0]])
-        end = attrs.evolve(cast(Any, guard), when=_all([*asked, Not(reduce(Or, possible))]))
+        end = attrs.evolve(cast(Any, guard), when=all_of([*asked, Not(reduce(Or, possible))]))
         yield Edge(Transition(source, None, end, name=f"{source}: no way on at {where}"), None)
 
     def _edge(
@@ -330,7 +325,7 @@ class Splitter:
         near = pieces.beside(sides, number)
         is_off = rests.is_off(pieces, number) if led else self._condition(near.is_off)
         for side, choice in rests.around(pieces, cell, number):
-            when = _all([is_off, *self._on(choice.chosen)])
+            when = all_of([is_off, *self._on(choice.chosen)])
             yield self._edge(cell, choice.cell, Guard(self._height(number), side, when=when, at_start=True))
         if led or pieces.rests(sides, number):
             return
@@ -350,7 +345,7 @@ class Splitter:
                 speed = self._function(surface.speed_above if side > 0 else surface.speed_below)
                 beyond = pieces.ties.along(sides, {number: 2 * side})
                 for choice in pieces.choices({**dict(cell.sides), **beyond}):
-                    when = _all(self._on(choice.chosen))
+                    when = all_of(self._on(choice.chosen))
                     yield self._edge(cell, choice.cell, Guard(speed, side, when=when), reset)
             return
         for side in (1, -1):
@@ -402,7 +397,7 @@ class Splitter:
         ]
         for chosen, after, target, conditions in landings:
             more = [*self._on(chosen), *conditions]
-            when = _all([*asked, *more]) if more else guard.when
+            when = all_of([*asked, *more]) if more else guard.when
             to = self.names.cell(self.surfaces.known, target.sides)
             copy = attrs.evolve(
                 transition,
@@ -500,8 +495,3 @@ def _begun(system: HybridSystem, modes: Mapping[str, Any] | None) -> Splitter:
 def _upper(sides: Sequence[tuple[int, int]]) -> dict[int, int]:
     """Sides with the branch above on each surface along which the state slides."""
     return {number: side or 2 for number, side in sides}
-
-
-def _all(conditions: Sequence[Expression]) -> Function | None:
-    """The condition that all of several hold; None for none."""
-    return scalar(reduce(And, conditions)) if conditions else None

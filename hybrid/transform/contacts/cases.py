@@ -13,8 +13,8 @@ from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.expression.operations import Less, LessEqual, Not
 from hybrid.system.growth import Place
 from hybrid.transform.contacts.decide import Decision, Judge
-from hybrid.transform.contacts.events import SETTLES, SUDDEN, Event
-from hybrid.transform.contacts.problem import NOISE, Case, Level, Outcome, matrix, outcome
+from hybrid.transform.contacts.events import SETTLES, SUDDEN, ContactEvent
+from hybrid.transform.contacts.problem import NOISE, Combination, Level, Outcome, matrix, outcome
 from hybrid.transform.contacts.solutions import stopped
 from hybrid.transform.contacts.statuses import OPEN, STICKS, Statuses
 from hybrid.transform.contacts.view import Mechanics, View
@@ -49,7 +49,7 @@ class Happening:
     """
 
     judge: Judge
-    event: Event
+    event: ContactEvent
     statuses: Statuses
     decision: Decision
 
@@ -164,13 +164,13 @@ class Happening:
         return [*map(node, view.moved(reached.forces, self.mechanics.rows_of(resting), q))]
 
 
-def _outcome(level: Level, in_numbers: Level, case: Case, stuck: Sequence[int]) -> Outcome:
+def _outcome(level: Level, in_numbers: Level, case: Combination, stuck: Sequence[int]) -> Outcome:
     found = outcome(level, case, stuck, matrix(in_numbers, case))
     assert found is not None, "only numbers can fail to determine forces"
     return found
 
 
-def _in_numbers(level: Level, case: Case) -> Outcome:
+def _in_numbers(level: Level, case: Combination) -> Outcome:
     found = outcome(level, case, ())
     assert found is not None, "the case was found in these numbers"
     return found

@@ -30,8 +30,8 @@ class Contact(Portable):
     gap
         ``g(t, x, p)``, positive in flight, of coordinates and time.
     restitution
-        Coefficient ``e`` from 0 to 1: a number, the name of a parameter, or a function of ``(t, x, p)``, which
-        reads the state before the impact.
+        Coefficient ``e`` from 0 to 1: a number, the name of a parameter, or a function of ``(t, x, p)``,
+        which reads the state before the impact.
     friction
         Coefficient ``mu >= 0`` of kinetic friction, in the same three forms. It needs ``slip``.
     slip
@@ -76,7 +76,7 @@ class Contact(Portable):
         self._check("friction", self.friction, None)
         if self.slip is None and (self.static is not None or not _is_zero(self.friction)):
             raise ModelError(
-                f"{self.title}: friction needs slip=, the relative tangential velocity: a function of (t, x, p)."
+                f"{self.title}: friction needs slip=, the tangential velocity: a function of (t, x, p)."
             )
         if self.static is not None:
             self._check("static", self.static, None)

@@ -11,8 +11,8 @@ import numpy as np
 from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.expression.operations import Absolute, And, LessEqual
 from hybrid.transform.contacts.contact import Contact
-from hybrid.transform.contacts.events import BREAKS, IMPACT, SETTLES, STOPS, SUDDEN, Event
-from hybrid.transform.contacts.problem import NOISE, Case, Level, Outcome, outcome
+from hybrid.transform.contacts.events import BREAKS, IMPACT, SETTLES, STOPS, SUDDEN, ContactEvent
+from hybrid.transform.contacts.problem import NOISE, Combination, Level, Outcome, outcome
 from hybrid.transform.contacts.solutions import (
     Found,
     by_history,
@@ -46,7 +46,8 @@ class Decision:
     approaching
         Those of them that approach: they have restitution.
     impulses
-        What holds at each of these while velocities change, in each phase of the impact; empty if they do not.
+        What holds at each of these while velocities change, in each phase of the impact; empty if they do
+        not.
     resting
         Those of them that do not separate.
     sliding
@@ -57,10 +58,10 @@ class Decision:
 
     closed: tuple[int, ...]
     approaching: tuple[int, ...]
-    impulses: tuple[Case, ...]
+    impulses: tuple[Combination, ...]
     resting: tuple[int, ...]
     sliding: tuple[int, ...]
-    forces: Case
+    forces: Combination
 
     def target(self, count: int) -> tuple[Statuses, tuple[int | None, ...]]:
         """What holds at each of all contacts afterwards, and whose friction each shares."""
@@ -96,7 +97,7 @@ class Undecided:
 NONE, SEVERAL_CASES = "painleve", "not unique"
 NEWTON, POISSON, SEQUENTIAL = LAWS = "newton", "poisson", "sequential"
 # Cases by phases, impulses and speeds afterwards by rows.
-Ended = tuple[tuple[Case, ...], list[float], list[float]]
+Ended = tuple[tuple[Combination, ...], list[float], list[float]]
 
 
 @attrs.frozen(eq=False)
@@ -116,12 +117,12 @@ class Judge:
     law: str = NEWTON
 
     def decide(
-        self, event: Event, statuses: Statuses, t: float, x: np.ndarray, parameters: np.ndarray
+        self, event: ContactEvent, statuses: Statuses, t: float, x: np.ndarray, parameters: np.ndarray
     ) -> Decision | Undecided:
         """What happens at an event in a mode in which these statuses hold."""
         view = self.mechanics.at(t, x, parameters)
         closed = self.closed(event, statuses, view)
-        impulses: tuple[Case, ...] = ()
+        impulses: tuple[Combination, ...] = ()
         approaching: list[int] = []
         if event.kind in SUDDEN:
             approaching = self.approaching(event, statuses, closed, view)
@@ -156,7 +157,7 @@ class Judge:
         parts = tuple(closed), tuple(approaching), impulses
         return self._rest(event, statuses, parts, moving, resting, sliding)
 
-    def is_bounce(self, event: Event, closed: Sequence[int]) -> bool:
+    def is_bounce(self, event: ContactEvent, closed: Sequence[int]) -> bool:
         """Whether an impact is one of a single contact without friction, which nothing needs to be asked of.
 
         It leads to flight; where it takes all speed it is the limit of a chatter, which is over at once.
@@ -186,7 +187,7 @@ class Judge:
         self, view: View, level: Level, closed: Sequence[int], approaching: Sequence[int]
     ) -> Ended | Undecided:
         options = [(OPEN, *closed_statuses(self.contact(i))) for i in closed]
-        cases: list[Case] = []
+        cases: list[Combination] = []
         forces = np.zeros(len(level.before))
         while True:
             kinds = several(level, consistent(level, options, range(len(closed))))
@@ -207,9 +208,9 @@ class Judge:
 
     def _rest(
         self,
-        event: Event,
+        event: ContactEvent,
         statuses: Statuses,
-        parts: tuple[tuple[int, ...], tuple[int, ...], tuple[Case, ...]],
+        parts: tuple[tuple[int, ...], tuple[int, ...], tuple[Combination, ...]],
         view: View,
         resting: Sequence[int],
         sliding: Sequence[int],
@@ -236,7 +237,7 @@ class Judge:
             if abs(view.gaps[i]) <= self.together and abs(view.speeds[row]) <= NOISE * view.fast[row]
         ]
         sliding = [self._sliding(view, i) for i in resting]
-        nothing = Event(SETTLES), (OPEN,) * len(rows)
+        nothing = ContactEvent(SETTLES), (OPEN,) * len(rows)
         return self._rest(*nothing, (tuple(resting), (), ()), view, resting, sliding)
 
     def named(
@@ -250,7 +251,7 @@ class Judge:
             merged[i] = None if other is None else closed[other]
         return statuses, tuple(merged)
 
-    def closed(self, event: Event, statuses: Statuses, view: View) -> list[int]:
+    def closed(self, event: ContactEvent, statuses: Statuses, view: View) -> list[int]:
         """The contacts whose gaps are closed at an event."""
         found = []
         for i, status in enumerate(statuses):
@@ -259,7 +260,9 @@ class Judge:
                 found.append(i)
         return found
 
-    def approaching(self, event: Event, statuses: Statuses, closed: Sequence[int], view: View) -> list[int]:
+    def approaching(
+        self, event: ContactEvent, statuses: Statuses, closed: Sequence[int], view: View
+    ) -> list[int]:
         """The closed contacts that approach, those of the event among them; none at the limit of chatter."""
         if event.kind == SETTLES:
             return []
@@ -268,7 +271,7 @@ class Judge:
             i for i in closed if i == event.contact or (statuses[i] == OPEN and view.speeds[rows[i][0]] < 0.0)
         ]
 
-    def is_near(self, event: Event, view: View, i: int) -> Any:
+    def is_near(self, event: ContactEvent, view: View, i: int) -> Any:
         """Whether a contact is closed at an event that changes velocities, in numbers or as an expression.
 
         At the limit of chatter one that moves is not.
@@ -299,7 +302,7 @@ class Judge:
         row = self.mechanics.places[i][1]
         return 0 if row is None else _sign(view.speeds[row], view.fast[row])
 
-    def _options(self, event: Event, statuses: Statuses, i: int, sliding: int) -> tuple[str, ...]:
+    def _options(self, event: ContactEvent, statuses: Statuses, i: int, sliding: int) -> tuple[str, ...]:
         if sliding:
             return OPEN, SLIPS_UP if sliding > 0 else SLIPS_DOWN
         possible = closed_statuses(self.contact(i))
@@ -307,7 +310,7 @@ class Judge:
             possible = tuple(each for each in possible if each != STICKS)
         return OPEN, *possible
 
-    def _with_idle(self, level: Level, found: Found, resting: Sequence[int]) -> Case:
+    def _with_idle(self, level: Level, found: Found, resting: Sequence[int]) -> Combination:
         """The case with the contacts named that stay closed only because others are."""
         case = found.case
         statuses = [*case.statuses]

@@ -127,15 +127,14 @@ def equations_of(space: Space, mass: Any, forces: Any, kinetic: Any, potential: 
     Raises
     ------
     ModelError
-        If neither masses nor kinetic energy is given, or both; if one of the functions has the wrong number of
-        values or cannot be traced; if the kinetic energy is not quadratic in the velocities; if the mass
+        If neither masses nor kinetic energy is given, or both; if one of the functions has the wrong number
+        of values or cannot be traced; if the kinetic energy is not quadratic in the velocities; if the mass
         matrix is not symmetric and positive definite at sample points.
     """
-    if (mass is None) == (kinetic is None):
-        raise ModelError(
-            "mechanics: give mass=, or kinetic= with potential=; got "
-            + ("neither." if mass is None else "mass= and kinetic=.")
-        )
+    if mass is None and kinetic is None:
+        raise ModelError("mechanics: mass is missing. Give mass=, or kinetic= with potential=.")
+    if mass is not None and kinetic is not None:
+        raise ModelError("mechanics: kinetic takes the place of mass; got both. Leave one out.")
     if potential is not None and kinetic is None:
         raise ModelError("mechanics: potential= goes with kinetic=; with mass= its forces belong to forces=.")
     n = space.size

@@ -10,7 +10,7 @@ SUDDEN = (IMPACT, SETTLES)
 
 
 @attrs.frozen
-class Event:
+class ContactEvent:
     """An event at a contact.
 
     Attributes

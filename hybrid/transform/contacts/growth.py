@@ -22,7 +22,7 @@ from hybrid.system.outputs import Formula, Output
 from hybrid.transform.contacts.cases import Happening, Written
 from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.contacts.decide import NONE, SEQUENTIAL, SEVERAL_CASES, Decision, Judge, Undecided
-from hybrid.transform.contacts.events import BREAKS, IMPACT, OPENS, SETTLES, STOPS, Event
+from hybrid.transform.contacts.events import BREAKS, IMPACT, OPENS, SETTLES, STOPS, ContactEvent
 from hybrid.transform.contacts.linear import dot
 from hybrid.transform.contacts.modes import Held, held
 from hybrid.transform.contacts.order import order_matters
@@ -35,7 +35,7 @@ from hybrid.transform.contacts.statuses import (
     mode_name,
     statuses_of,
 )
-from hybrid.transform.contacts.view import FORCES
+from hybrid.transform.contacts.view import FORCES, View
 
 SETTLING = "settles"
 # A gain of kinetic energy below this share is rounding.
@@ -66,7 +66,7 @@ class Watch:
 
     source: str
     statuses: Statuses
-    event: Event
+    event: ContactEvent
     guard: Guard
     title: str
     cases: list[tuple[Transition, Expression]] = attrs.field(factory=list)
@@ -100,7 +100,11 @@ class ContactGrowth:
         self.ambiguous: dict[str, str] = {}
         count = len(self.mechanics.contacts)
         self.settling = Watch(
-            SETTLING, (OPEN,) * count, Event(SETTLES), Guard(scalar(Number(1)), +1, at_start=True), "settle"
+            SETTLING,
+            (OPEN,) * count,
+            ContactEvent(SETTLES),
+            Guard(scalar(Number(1)), +1, at_start=True),
+            "settle",
         )
         sample = self.original.variables
         start = 0.0, np.ones(sample.dimension), sample.defaults
@@ -133,7 +137,7 @@ class ContactGrowth:
             if isinstance(decision, Undecided):
                 known = watch.undecided is not None and watch.undecided.name == decision.name
                 watch.undecided = decision
-                self.told[transition] = self._why(watch, decision)
+                self.told[transition] = self._why(watch, decision, self.mechanics.at(*place))
                 self.stage = None if not known else self.stage
                 return not known
             if decision in watch.decisions:
@@ -219,6 +223,7 @@ class ContactGrowth:
     def _start(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> str:
         if mode == SETTLING:
             return mode
+        self._check_gaps(t, x, parameters)
         if mode is not None:
             known = next((each for each in self.made.values() if each.mode.name == mode), None)
             if known is not None:
@@ -234,6 +239,20 @@ class ContactGrowth:
                 )
             return SETTLING
         return self._make(decision.target(len(self.contacts)), (t, x, parameters)).mode.name
+
+    def _check_gaps(self, t: float, x: np.ndarray, parameters: np.ndarray) -> None:
+        with np.errstate(all="ignore"):
+            gaps = self._gap_program.run(self.mechanics.space.values(t, x, parameters))
+        for contact, gap in zip(self.contacts, gaps, strict=True):
+            if gap < -self.judge.together:
+                raise ArgumentError(
+                    f"x0 = {tuple(map(float, x))}: the gap of contact {contact.name!r} is {gap:g}, and "
+                    "bodies cannot overlap. Start with a gap that is not negative."
+                )
+
+    @cached_property
+    def _gap_program(self) -> Program:
+        return Program(self.mechanics.view.gaps)
 
     def _make(self, key: Key, place: Place) -> Made:
         """The mode of some statuses."""
@@ -259,7 +278,7 @@ class ContactGrowth:
             name = contact.name
 
             def watch(kind: str, guard: Guard, title: str, i: int = i) -> Watch:
-                return Watch(source, statuses, Event(kind, i), guard, title)
+                return Watch(source, statuses, ContactEvent(kind, i), guard, title)
 
             if status == OPEN:
                 yield watch(IMPACT, gaps[i], name)
@@ -368,18 +387,17 @@ class ContactGrowth:
             found[gap] = Output(gap, (Formula(None, self._gaps[i].function),))
         return found
 
-    def _why(self, watch: Watch, undecided: Undecided) -> str:
+    def _why(self, watch: Watch, undecided: Undecided, view: View) -> str:
         """Why a run ends where nothing is decided."""
         names = ", ".join(repr(self.contacts[i].name) for i in undecided.contacts)
         what = "impact" if undecided.sudden else "accelerations"
         friction = ", ".join(
-            f"{self.contacts[i].name}: {self.contacts[i].friction}"
+            f"{view.friction[i]:g} at {self.contacts[i].name!r}"
             for i in undecided.contacts
             if self.contacts[i].has_friction
         )
-        text = f"contact {names} in mode {watch.source!r}" + (
-            f", with friction {friction}" if friction else ""
-        )
+        where = "where a run starts or settles" if watch.source == SETTLING else f"in mode {watch.source!r}"
+        text = f"contact {names} {where}" + (f", with friction {friction}" if friction else "")
         if undecided.name == NONE:
             return f"No {what} agree with Coulomb's law there (Painleve's paradox): {text}."
         return f"Several {what} are consistent there: {text}; {self._cases(undecided)}."

@@ -12,7 +12,7 @@ from hybrid.expression.evaluation import Program, expressed
 from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.system.elements import Function
 from hybrid.transform.contacts.equations import Space
-from hybrid.transform.contacts.problem import DEPENDENT, Case, Level, matrix, outcome
+from hybrid.transform.contacts.problem import DEPENDENT, Combination, Level, matrix, outcome
 from hybrid.transform.contacts.statuses import IDLE, OPEN, Statuses
 from hybrid.transform.contacts.view import FORCES, Mechanics, View
 
@@ -51,9 +51,9 @@ def held(
 ) -> Held:
     """The mode of some statuses; ``place`` is ``(t, x, parameters)`` where it is first entered.
 
-    Forces keep the rates of gaps, and of slips of contacts that stick, at zero. Rounding and the errors of the
-    solver would let these drift, so forces also pull them back at the pace ``k`` of the motion, which changes
-    nothing where they are zero: ``g'' = -2 k g' - k^2 g`` (Baumgarte).
+    Forces keep the rates of gaps, and of slips of contacts that stick, at zero. Rounding and the errors of
+    the solver would let these drift, so forces also pull them back at the pace ``k`` of the motion, which
+    changes nothing where they are zero: ``g'' = -2 k g' - k^2 g`` (Baumgarte).
     """
     space, view, count = mechanics.space, mechanics.view, len(statuses)
     normal: list[Any] = [node(0.0)] * count
@@ -62,7 +62,7 @@ def held(
     if not closed:
         return Held(expressed([*space.u, *map(node, view.free)]), None, normal, tangential)
     shared = [None if merged[i] is None else closed.index(merged[i]) for i in closed]  # type: ignore[arg-type]
-    case = Case(tuple(statuses[i] for i in closed), tuple(shared), (False,) * len(closed))
+    case = Combination(tuple(statuses[i] for i in closed), tuple(shared), (False,) * len(closed))
     exact, rows = mechanics.forces(view, closed), mechanics.rows_of(closed)
     numbers = matrix(mechanics.forces(mechanics.at(*place), closed), case)
     pace = _pace(space, view.moved(_forces(exact, case, numbers), rows, view.free), place)
@@ -91,7 +91,7 @@ def held(
     return Held(field, expressed(kept), normal, tangential, frozenset(unknown))
 
 
-def _forces(level: Level, case: Case, numbers: np.ndarray) -> list[Any]:
+def _forces(level: Level, case: Combination, numbers: np.ndarray) -> list[Any]:
     found = outcome(level, case, (), numbers)
     assert found is not None, "only numbers can fail to determine forces"
     return found.forces

@@ -1,10 +1,10 @@
 """The complementarity problem of closed contacts, at the level of velocities or of accelerations.
 
 Both levels are alike. A contact has a normal speed (or acceleration) ``v`` and, with friction, a tangential
-one; forces (impulses) ``f`` at the contacts change them by ``G f``, where ``G = W M^-1 W^T`` (Delassus). One case
-says what holds at each contact, so its forces solve linear equations; it is consistent if certain quantities
-are not negative. The same text computes with numbers, to find the consistent cases, and with expressions, to
-write a case into a transition.
+one; forces (impulses) ``f`` at the contacts change them by ``G f``, where ``G = W M^-1 W^T`` (Delassus). One
+case says what holds at each contact, so its forces solve linear equations; it is consistent if certain
+quantities are not negative. The same text computes with numbers, to find the consistent cases, and with
+expressions, to write a case into a transition.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ DEPENDENT = 1e-9
 
 
 @attrs.frozen
-class Case:
+class Combination:
     """What holds at each contact.
 
     Attributes
@@ -115,7 +115,7 @@ class Outcome:
 
 
 def outcome(
-    level: Level, case: Case, stuck: Sequence[int], numbers: np.ndarray | None = None
+    level: Level, case: Combination, stuck: Sequence[int], numbers: np.ndarray | None = None
 ) -> Outcome | None:
     """What a case leads to; None if it does not determine its forces.
 
@@ -139,13 +139,13 @@ def outcome(
     return Outcome(forces, after, [*_conditions(level, case, stuck, forces, after)])
 
 
-def matrix(level: Level, case: Case) -> np.ndarray:
+def matrix(level: Level, case: Combination) -> np.ndarray:
     """The matrix of the equations of a case, in numbers."""
     unknowns, _, wanted = _equations(level, case)
     return np.array([[dot(level.delassus[row], column) for column in unknowns] for row, _ in wanted])
 
 
-def _equations(level: Level, case: Case) -> tuple[list[list[Any]], list[Any], list[tuple[int, Any]]]:
+def _equations(level: Level, case: Combination) -> tuple[list[list[Any]], list[Any], list[tuple[int, Any]]]:
     """Forces by rows for a unit of each unknown, and without any; the rows that have a target, with it."""
     size = len(level.before)
     unknowns, start, wanted = [], [0.0] * size, []
@@ -183,7 +183,7 @@ def solved_in_numbers(rows: list[list[float]], right: list[float]) -> list[float
 
 
 def _conditions(
-    level: Level, case: Case, stuck: Sequence[int], forces: list[Any], after: list[Any]
+    level: Level, case: Combination, stuck: Sequence[int], forces: list[Any], after: list[Any]
 ) -> Iterator[tuple[Any, Any]]:
     for i, status in enumerate(case.statuses):
         row = level.row(i)

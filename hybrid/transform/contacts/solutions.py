@@ -8,7 +8,7 @@ from itertools import product
 import attrs
 import numpy as np
 
-from hybrid.transform.contacts.problem import DEPENDENT, Case, Level, Outcome, holds, outcome
+from hybrid.transform.contacts.problem import DEPENDENT, Combination, Level, Outcome, holds, outcome
 from hybrid.transform.contacts.statuses import HELD, IDLE, OPEN, SIGNS, STICKS, Statuses
 
 # Solutions whose speeds differ by more than this share of their terms are several.
@@ -19,7 +19,7 @@ SEVERAL = 1e-6
 class Found:
     """A consistent case and what it leads to."""
 
-    case: Case
+    case: Combination
     outcome: Outcome
 
 
@@ -41,7 +41,7 @@ def consistent(level: Level, options: Sequence[Sequence[str]], stuck: Sequence[i
     return found
 
 
-def _cases(level: Level, options: Sequence[Sequence[str]]) -> Iterator[Case]:
+def _cases(level: Level, options: Sequence[Sequence[str]]) -> Iterator[Combination]:
     """All cases: a contact with an impulse that it is given pushes, and opens or needs more."""
     ways = [
         [(status, lifts) for status in each if status != OPEN for lifts in (True, False)]
@@ -51,10 +51,10 @@ def _cases(level: Level, options: Sequence[Sequence[str]]) -> Iterator[Case]:
     ]
     for chosen in product(*ways):
         statuses = tuple(status for status, _ in chosen)
-        yield Case(statuses, merged_in(level, statuses), tuple(lifts for _, lifts in chosen))
+        yield Combination(statuses, merged_in(level, statuses), tuple(lifts for _, lifts in chosen))
 
 
-def _forces(case: Case) -> tuple[int, int]:
+def _forces(case: Combination) -> tuple[int, int]:
     """How many normal forces are to be found; of cases with as many, those that stick come first."""
     held = sum(case.is_held(i) for i in range(len(case.statuses)))
     return held, -sum(each == STICKS for each in case.statuses)
@@ -102,7 +102,7 @@ def by_history(level: Level, found: Sequence[Found]) -> list[Found]:
     return [each for each in found if not any(each.case.statuses[k] in SIGNS for k in kept)]
 
 
-def stopped(level: Level, still: Sequence[int]) -> Case:
+def stopped(level: Level, still: Sequence[int]) -> Combination:
     """The case that stops all contacts, and the slips of those that are ``still``.
 
     It has impulses in directions that do not depend on others.
@@ -116,7 +116,7 @@ def stopped(level: Level, still: Sequence[int]) -> Case:
         if statuses[i] == HELD and not is_implied(level, level.across(i), pushing):
             statuses[i] = STICKS
             pushing.append(level.across(i))
-    return Case(tuple(statuses), (None,) * len(statuses), (False,) * len(statuses))
+    return Combination(tuple(statuses), (None,) * len(statuses), (False,) * len(statuses))
 
 
 def is_implied(level: Level, row: int, others: Sequence[int]) -> bool:

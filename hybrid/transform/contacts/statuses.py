@@ -53,8 +53,8 @@ def statuses_of(contacts: Sequence[Contact], name: str) -> Statuses:
         for part in name.split(", ") if name in known or ", " in name else name.split("+"):
             if part not in known:
                 raise ModelError(
-                    f"Mode {name!r} does not exist. Modes are named by what holds: {FREE!r}, or one or several "
-                    f"of {', '.join(map(repr, known))}, joined by '+', or by ', ' if there is friction."
+                    f"Mode {name!r} does not exist. Modes are named by what holds: {FREE!r}, or some "
+                    f"of {', '.join(map(repr, known))}; joined by '+', by ', ' if there is friction."
                 )
             i, found[i] = known[part]
     if mode_name(contacts, tuple(found)) != name:

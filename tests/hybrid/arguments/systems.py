@@ -37,6 +37,9 @@ REPEATS = [None, "a", 3, [3], ["a"], [None], {"cell": 3}, Odd()]
 MEMORY = [None, "u", 1, True, ("1u",), ("u", "u"), (1,), {"u"}, [["u"]], Odd()]
 
 
+# Coefficients of contacts.
+COEFFICIENT = [None, -0.1, 2.0, True, math.nan, math.inf, "", [0.5], Odd()]
+
 # Names that an author gives to modes; the first system that takes them has one switch, that of abs(q).
 CALLED = [
     *LIST[2:4], True, Odd(), {"a": 3}, {"a": None}, {3: "q<0"}, {"": "q<0"}, {"a": lambda t, x, p: x.q},
@@ -181,7 +184,49 @@ def systems():
                 "name": [*TEXT, ""],
                 "field": [None, *FUNCTION],
                 "jacobian": FUNCTION,
+                "holds": FUNCTION,
                 "part_of": [*TEXT[1:], ""],
+            },
+        ),
+        (
+            call(hybrid.Contact, "floor", lambda t, x, p: x.q, slip=lambda t, x, p: x.v),
+            {
+                "name": [*TEXT, "", "a, b", "a+b"],
+                "gap": [None, *FUNCTION],
+                "restitution": COEFFICIENT,
+                "friction": [each for each in COEFFICIENT if each != 2.0],
+                "slip": FUNCTION,
+                "static": [each for each in COEFFICIENT[1:] if each != 2.0],
+            },
+        ),
+        (
+            call(
+                hybrid.mechanics,
+                coordinates=("q",),
+                velocities=("v",),
+                parameters={"e": 0.5},
+                mass=lambda t, x, p: (1.0,),
+                forces=lambda t, x, p: (-1.0,),
+                contacts=[hybrid.Contact("floor", lambda t, x, p: x.q)],
+            ),
+            {
+                "coordinates": [None, 3, (), ("1q",), (1,), ("q", "r"), Odd()],
+                "velocities": [None, 3, (), ("1q",), (1,), Odd()],
+                "parameters": [[1], "a", 3, {"e": "1"}, {"e": math.nan}, {"e": True}, {"1": 1.0}, {3: 1.0}],
+                "contacts": [*LIST, [], [1], ["a"]],
+                "mass": [None, *FUNCTION, lambda t, x, p: (1.0, 2.0), lambda t, x, p: (-1.0,)],
+                "forces": [*FUNCTION, lambda t, x, p: (1.0, 2.0)],
+                "kinetic": [*FUNCTION, lambda t, x, p: x.v**2],
+                "potential": [*FUNCTION, lambda t, x, p: x.q],
+                "impacts": [None, 3, "hertz", Odd()],
+                "together": [each for each in QUANTITY if not callable(each)],
+                "start": NAME,
+                "period": [*LIMIT[1:], math.inf],
+                "name": TEXT,
+                "units": UNITS,
+                "angles": ANGLES,
+                "outputs": OUTPUTS,
+                "laws": [*FUNCTION, {}, Odd()],
             },
         ),
         (

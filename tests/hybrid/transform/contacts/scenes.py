@@ -90,9 +90,7 @@ def slender(b, h, friction=None):
                 "slip": lambda t, x, p: x.u + (h * np.cos(x.phi) - side * b * np.sin(x.phi)) * x.w,
                 "friction": friction,
             }
-        return Contact(
-            name, gap=lambda t, x, p: x.y - h * np.cos(x.phi) + side * b * np.sin(x.phi), **given
-        )
+        return Contact(name, gap=lambda t, x, p: x.y - h * np.cos(x.phi) + side * b * np.sin(x.phi), **given)
 
     return mechanics(
         coordinates=("x", "y", "phi"),

@@ -34,7 +34,9 @@ class TestBlock:
         first = arc.jumps["floor slips"][0].t
         assert first == pytest.approx(loose / 0.5, abs=1e-12)
         angle = np.arctan2(0.5 / omega, loose - centre)
-        assert arc.jumps["floor stops"][0].t - first == pytest.approx((np.pi + 2.0 * angle) / omega, abs=1e-10)
+        assert arc.jumps["floor stops"][0].t - first == pytest.approx(
+            (np.pi + 2.0 * angle) / omega, abs=1e-10
+        )
 
     def test_sticks_at_once_where_a_fall_ends(self):
         arc = simulate(block(), (0.0, 1.0, 1.0, 0.0), (0.0, 3.0), parameters={"e": 0.5, "mu": 0.3})

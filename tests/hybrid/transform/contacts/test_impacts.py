@@ -10,7 +10,8 @@ from tests.hybrid.transform.contacts.scenes import G, cradle, slender, touching
 
 class TestCradle:
     @pytest.mark.parametrize(
-        ("count", "after"), [(3, np.array([-1.0, 2.0, 2.0]) / 3.0), (5, np.array([-3.0, 2.0, 2.0, 2.0, 2.0]) / 5.0)]
+        ("count", "after"),
+        [(3, np.array([-1.0, 2.0, 2.0]) / 3.0), (5, np.array([-3.0, 2.0, 2.0, 2.0, 2.0]) / 5.0)],
     )
     def test_balls_that_touch(self, count, after):
         arc = simulate(cradle(count), touching(count), (0.0, 3.0))
@@ -174,8 +175,9 @@ class TestEnergy:
             return mechanics(
                 coordinates=("a", "b"),
                 velocities=("u", "w"),
-                kinetic=lambda t, x, p: 0.5
-                * (x.u**2 / 3.0 + x.u**2 + x.u * x.w * np.cos(x.a - x.b) + x.w**2 / 3.0),
+                kinetic=lambda t, x, p: (
+                    0.5 * (x.u**2 / 3.0 + x.u**2 + x.u * x.w * np.cos(x.a - x.b) + x.w**2 / 3.0)
+                ),
                 forces=lambda t, x, p: (0.0, 0.0),
                 contacts=[
                     Contact(

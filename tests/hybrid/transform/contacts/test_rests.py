@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 import hybrid
 from hybrid import Contact, mechanics, simulate
 from lyapunov import lyapunov_spectrum
-from tests.hybrid.transform.contacts.scenes import G, K, A, ball, beam, bead, track
+from tests.hybrid.transform.contacts.scenes import A, G, K, ball, bead, beam, track
 
 
 class TestBall:
