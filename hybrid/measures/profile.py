@@ -169,8 +169,8 @@ def _parts_of(arc: HybridArc, quantity: Evaluator) -> Parts:
     low, width = np.zeros(len(left)), np.ones(len(left))
     done: list[Parts] = []
     scale, rounding, most = 0.0, np.zeros(len(pieces.h)), max(MOST_PARTS, MOST_PER_STEP * len(left))
-    if name in arc.system.state_names:
-        terms = pieces.coefficients[:, :, arc.system.state_names.index(name)]
+    if quantity.name in arc.system.state_names:
+        terms = pieces.coefficients[:, :, arc.system.state_names.index(quantity.name)]
         rounding = OF_TERMS * np.abs(terms).sum(axis=1)
     while left.size:
         made = Parts(left, low, width, np.empty((len(left), DEGREE + 1)))
