@@ -13,10 +13,10 @@ from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.expression.operations import Less, LessEqual, Not
 from hybrid.system.growth import Place
 from hybrid.transform.contacts.decide import Decision, Judge
-from hybrid.transform.contacts.events import SETTLES, SUDDEN, ContactEvent
-from hybrid.transform.contacts.problem import NOISE, Combination, Level, Outcome, matrix, outcome
-from hybrid.transform.contacts.solutions import stopped
-from hybrid.transform.contacts.statuses import OPEN, STICKS, Statuses
+from hybrid.transform.contacts.events import BREAKS, SETTLES, SUDDEN, ContactEvent
+from hybrid.transform.contacts.problem import NOISE, SHARED, Combination, Level, Outcome, matrix, outcome
+from hybrid.transform.contacts.solutions import is_shared, stopped
+from hybrid.transform.contacts.statuses import OPEN, STICKS
 from hybrid.transform.contacts.view import Mechanics, View
 
 
@@ -42,7 +42,7 @@ class Happening:
 
     Attributes
     ----------
-    event, statuses
+    event, now
         The event, and what holds in the mode.
     decision
         What happens.
@@ -50,7 +50,7 @@ class Happening:
 
     judge: Judge
     event: ContactEvent
-    statuses: Statuses
+    now: Combination
     decision: Decision
 
     @property
@@ -61,7 +61,7 @@ class Happening:
     @property
     def opens(self) -> list[int]:
         """The closed contacts that neither the mode nor the event closes."""
-        return [i for i in self.decision.closed if self.statuses[i] == OPEN and i != self.event.contact]
+        return [i for i in self.decision.closed if self.now.statuses[i] == OPEN and i != self.event.contact]
 
     def written(self, place: Place) -> Written:
         """The decision as expressions; ``place`` is where it was made."""
@@ -82,7 +82,11 @@ class Happening:
             numbers = self.mechanics.at(t, x, parameters)
         level, in_numbers = (self.mechanics.forces(each, decision.resting) for each in (view, numbers))
         stuck = [k for k, sign in enumerate(decision.sliding) if sign == 0]
-        conditions += _consistent(_outcome(level, in_numbers, decision.forces, stuck))
+        reached = _outcome(level, in_numbers, decision.forces, stuck)
+        if self.event.kind == BREAKS and is_shared(decision.forces, self.now.of_closed(decision.resting)):
+            conditions += [Less(SHARED * node(noise), node(value)) for value, noise in reached.conditions]
+        else:
+            conditions += _consistent(reached)
         return Written(conditions, state)
 
     def _impact(self, numbers: View, conditions: list[Expression]) -> tuple[tuple[Level, Outcome], list[Any]]:
@@ -106,7 +110,7 @@ class Happening:
 
     def _closed(self) -> Iterator[Expression]:
         """That these gaps are closed, of those that the mode and the event do not close, and no others."""
-        for i, status in enumerate(self.statuses):
+        for i, status in enumerate(self.now.statuses):
             if status == OPEN and i != self.event.contact:
                 near = self.judge.is_near(self.event, self.mechanics.view, i)
                 yield near if i in self.decision.closed else Not(near)

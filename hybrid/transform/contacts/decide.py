@@ -12,13 +12,14 @@ from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.expression.operations import Absolute, And, LessEqual
 from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.contacts.events import BREAKS, IMPACT, SETTLES, STOPS, SUDDEN, ContactEvent
-from hybrid.transform.contacts.problem import NOISE, Combination, Level, Outcome, outcome
+from hybrid.transform.contacts.problem import NOISE, SHARED, Combination, Level, Outcome, outcome
 from hybrid.transform.contacts.solutions import (
     Found,
+    borne,
     by_history,
     consistent,
     is_implied,
-    merged_in,
+    is_shared,
     several,
     stopped,
 )
@@ -28,7 +29,6 @@ from hybrid.transform.contacts.statuses import (
     SIGNS,
     SLIPS_DOWN,
     SLIPS_UP,
-    STICKS,
     Statuses,
     closed_statuses,
 )
@@ -63,13 +63,9 @@ class Decision:
     sliding: tuple[int, ...]
     forces: Combination
 
-    def target(self, count: int) -> tuple[Statuses, tuple[int | None, ...]]:
-        """What holds at each of all contacts afterwards, and whose friction each shares."""
-        statuses, merged = [OPEN] * count, list[int | None]([None] * count)
-        for i, status, other in zip(self.resting, self.forces.statuses, self.forces.merged, strict=True):
-            statuses[i] = status
-            merged[i] = None if other is None else self.resting[other]
-        return tuple(statuses), tuple(merged)
+    def target(self, count: int) -> Combination:
+        """What holds at each of all contacts afterwards."""
+        return self.forces.of_all(self.resting, count)
 
 
 @attrs.frozen
@@ -117,9 +113,10 @@ class Judge:
     law: str = NEWTON
 
     def decide(
-        self, event: ContactEvent, statuses: Statuses, t: float, x: np.ndarray, parameters: np.ndarray
+        self, event: ContactEvent, now: Combination, t: float, x: np.ndarray, parameters: np.ndarray
     ) -> Decision | Undecided:
-        """What happens at an event in a mode in which these statuses hold."""
+        """What happens at an event ``now``, in a mode in which this holds."""
+        statuses = now.statuses
         view = self.mechanics.at(t, x, parameters)
         closed = self.closed(event, statuses, view)
         impulses: tuple[Combination, ...] = ()
@@ -155,7 +152,7 @@ class Judge:
                 0 if event.kind == STOPS and i == event.contact else SIGNS.get(statuses[i], 0) for i in closed
             ]
         parts = tuple(closed), tuple(approaching), impulses
-        return self._rest(event, statuses, parts, moving, resting, sliding)
+        return self._rest(event, now, parts, moving, resting, sliding)
 
     def is_bounce(self, event: ContactEvent, closed: Sequence[int]) -> bool:
         """Whether an impact is one of a single contact without friction, which nothing needs to be asked of.
@@ -209,7 +206,7 @@ class Judge:
     def _rest(
         self,
         event: ContactEvent,
-        statuses: Statuses,
+        now: Combination,
         parts: tuple[tuple[int, ...], tuple[int, ...], tuple[Combination, ...]],
         view: View,
         resting: Sequence[int],
@@ -217,9 +214,15 @@ class Judge:
     ) -> Decision | Undecided:
         """What holds after an event, from accelerations."""
         level = self.mechanics.forces(view, resting)
-        options = [self._options(event, statuses, i, sign) for i, sign in zip(resting, sliding, strict=True)]
+        options = [self._options(i, sign) for i, sign in zip(resting, sliding, strict=True)]
         stuck = [k for k, sign in enumerate(sliding) if sign == 0]
-        found = by_history(level, consistent(level, options, stuck))
+        found = consistent(level, options, stuck)
+        if event.kind == BREAKS:
+            # What holds is over, unless the contacts can share what they bear in another way.
+            before = now.of_closed(resting)
+            found = [each for each in found if not is_shared(each.case, before) or each.margin > SHARED]
+            found.sort(key=lambda each: -each.margin if is_shared(each.case, before) else 0.0)
+        found = by_history(level, found)
         kinds = several(level, found)
         if len(kinds) != 1:
             return _undecided(resting, kinds, False)
@@ -237,19 +240,15 @@ class Judge:
             if abs(view.gaps[i]) <= self.together and abs(view.speeds[row]) <= NOISE * view.fast[row]
         ]
         sliding = [self._sliding(view, i) for i in resting]
-        nothing = ContactEvent(SETTLES), (OPEN,) * len(rows)
+        nothing = ContactEvent(SETTLES), Combination.of([OPEN] * len(rows))
         return self._rest(*nothing, (tuple(resting), (), ()), view, resting, sliding)
 
-    def named(
-        self, statuses: Statuses, t: float, x: np.ndarray, parameters: np.ndarray
-    ) -> tuple[Statuses, tuple[int | None, ...]]:
-        """The statuses of a mode that a call names, and whose friction each contact shares there."""
+    def named(self, statuses: Statuses, t: float, x: np.ndarray, parameters: np.ndarray) -> Combination:
+        """The statuses of a mode that a call names, and how the contacts share what they bear there."""
         closed = [i for i, each in enumerate(statuses) if each != OPEN]
         level = self.mechanics.forces(self.mechanics.at(t, x, parameters), closed)
-        merged: list[int | None] = [None] * len(statuses)
-        for i, other in zip(closed, merged_in(level, tuple(statuses[i] for i in closed)), strict=True):
-            merged[i] = None if other is None else closed[other]
-        return statuses, tuple(merged)
+        case = Combination.of([statuses[i] for i in closed])
+        return next(borne(level, case), case).of_all(closed, len(statuses))
 
     def closed(self, event: ContactEvent, statuses: Statuses, view: View) -> list[int]:
         """The contacts whose gaps are closed at an event."""
@@ -302,13 +301,10 @@ class Judge:
         row = self.mechanics.places[i][1]
         return 0 if row is None else _sign(view.speeds[row], view.fast[row])
 
-    def _options(self, event: ContactEvent, statuses: Statuses, i: int, sliding: int) -> tuple[str, ...]:
+    def _options(self, i: int, sliding: int) -> tuple[str, ...]:
         if sliding:
             return OPEN, SLIPS_UP if sliding > 0 else SLIPS_DOWN
-        possible = closed_statuses(self.contact(i))
-        if event.kind == BREAKS and i == event.contact:
-            possible = tuple(each for each in possible if each != STICKS)
-        return OPEN, *possible
+        return OPEN, *closed_statuses(self.contact(i))
 
     def _with_idle(self, level: Level, found: Found, resting: Sequence[int]) -> Combination:
         """The case with the contacts named that stay closed only because others are."""

@@ -26,12 +26,12 @@ from hybrid.transform.contacts.events import BREAKS, IMPACT, OPENS, SETTLES, STO
 from hybrid.transform.contacts.linear import dot
 from hybrid.transform.contacts.modes import Held, held
 from hybrid.transform.contacts.order import order_matters
+from hybrid.transform.contacts.problem import Combination
+from hybrid.transform.contacts.solutions import is_shared
 from hybrid.transform.contacts.statuses import (
     IDLE,
     OPEN,
     SIGNS,
-    STICKS,
-    Statuses,
     mode_name,
     statuses_of,
 )
@@ -40,8 +40,6 @@ from hybrid.transform.contacts.view import FORCES, View
 SETTLING = "settles"
 # A gain of kinetic energy below this share is rounding.
 GAIN = 1e-9
-# What holds at each contact, and whose friction each shares.
-Key = tuple[Statuses, tuple[int | None, ...]]
 
 
 @attrs.define(eq=False)
@@ -50,7 +48,7 @@ class Watch:
 
     Attributes
     ----------
-    source, statuses
+    source, now
         The mode, by its name and by what holds there.
     event, guard
         What is looked out for.
@@ -65,7 +63,7 @@ class Watch:
     """
 
     source: str
-    statuses: Statuses
+    now: Combination
     event: ContactEvent
     guard: Guard
     title: str
@@ -91,7 +89,7 @@ class ContactGrowth:
         self.mechanics = judge.mechanics
         self.written: dict[Any, Any] = {}
         self.lock = RLock()
-        self.made: dict[Key, Made] = {}
+        self.made: dict[Combination, Made] = {}
         self.stage: HybridSystem | None = None
         self.frontier: dict[str, Watch] = {}
         self.told: dict[str, str] = {}
@@ -101,14 +99,14 @@ class ContactGrowth:
         count = len(self.mechanics.contacts)
         self.settling = Watch(
             SETTLING,
-            (OPEN,) * count,
+            Combination.of([OPEN] * count),
             ContactEvent(SETTLES),
             Guard(scalar(Number(1)), +1, at_start=True),
             "settle",
         )
         sample = self.original.variables
         start = 0.0, np.ones(sample.dimension), sample.defaults
-        self._make(((OPEN,) * count, (None,) * count), start)
+        self._make(Combination.of([OPEN] * count), start)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return self.called
@@ -133,7 +131,7 @@ class ContactGrowth:
         """Make what happens at the end of a run; False if nothing can: the run ends there."""
         with self.lock:
             watch = self.frontier[transition]
-            decision = self.judge.decide(watch.event, watch.statuses, *place)
+            decision = self.judge.decide(watch.event, watch.now, *place)
             if isinstance(decision, Undecided):
                 known = watch.undecided is not None and watch.undecided.name == decision.name
                 watch.undecided = decision
@@ -195,7 +193,7 @@ class ContactGrowth:
     def _write(self, watch: Watch, decision: Decision, place: Place) -> None:
         """Make the transition of a decision."""
         watch.decisions.append(decision)
-        case = Happening(self.judge, watch.event, watch.statuses, decision).written(place)
+        case = Happening(self.judge, watch.event, watch.now, decision).written(place)
         if case.state is not None:
             t, x, parameters = place
             after = Program(case.state).run(self.mechanics.space.values(t, x, parameters))
@@ -254,31 +252,30 @@ class ContactGrowth:
     def _gap_program(self) -> Program:
         return Program(self.mechanics.view.gaps)
 
-    def _make(self, key: Key, place: Place) -> Made:
-        """The mode of some statuses."""
-        if key not in self.made:
-            name = mode_name(self.contacts, key[0])
+    def _make(self, now: Combination, place: Place) -> Made:
+        """The mode in which ``now`` holds."""
+        if now not in self.made:
+            name = mode_name(self.contacts, now.statuses)
             taken = {each.mode.name for each in self.made.values()}
             name = next(
                 each for each in chain([name], (f"{name} ({k})" for k in count(2))) if each not in taken
             )
-            forces = held(self.mechanics, *key, place)
+            forces = held(self.mechanics, now, place)
             mode = Mode(name, forces.field, holds=forces.holds)
-            self.made[key] = Made(mode, forces, [*self._watches(name, key, forces)])
+            self.made[now] = Made(mode, forces, [*self._watches(name, now, forces)])
             if forces.undetermined:
                 self.notes[f"{name}: some contact forces are not determined there; the motion is."] = None
             self.stage = None
-        return self.made[key]
+        return self.made[now]
 
-    def _watches(self, source: str, key: Key, forces: Held) -> Iterator[Watch]:
+    def _watches(self, source: str, now: Combination, forces: Held) -> Iterator[Watch]:
         """What a mode looks out for."""
-        statuses, merged = key
         view, gaps = self.mechanics.view, self._gaps
-        for i, (contact, status) in enumerate(zip(self.contacts, statuses, strict=True)):
+        for i, (contact, status) in enumerate(zip(self.contacts, now.statuses, strict=True)):
             name = contact.name
 
             def watch(kind: str, guard: Guard, title: str, i: int = i) -> Watch:
-                return Watch(source, statuses, ContactEvent(kind, i), guard, title)
+                return Watch(source, now, ContactEvent(kind, i), guard, title)
 
             if status == OPEN:
                 yield watch(IMPACT, gaps[i], name)
@@ -287,8 +284,8 @@ class ContactGrowth:
                 continue
             yield watch(OPENS, Guard(scalar(forces.normal[i]), -1), f"{name} opens")
             row = self.mechanics.places[i][1]
-            if status == STICKS and merged[i] is None:
-                group = [j for j, by in enumerate(merged) if j == i or by == i]
+            if now.sticks(i):
+                group = [j for j, by in enumerate(now.merged) if j == i or by == i]
                 most = add(*(view.static[j] * forces.normal[j] for j in group))
                 for sign in (1, -1):
                     yield watch(
@@ -307,10 +304,7 @@ class ContactGrowth:
         condition: Expression = reduce(And, case.conditions) if case.conditions else Number(1)
         asked = reduce(And, (Not(each) for _, each in watch.cases), condition)
         reset = None if case.state is None else Reset(expressed(case.state))
-        several = [i for i in decision.closed if watch.statuses[i] == OPEN]
-        title = (
-            "+".join(self.contacts[i].name for i in several) if watch.event.kind == IMPACT else watch.title
-        )
+        title = self._title(watch, decision)
         to = target.mode.name
         transition = Transition(
             watch.source,
@@ -322,6 +316,15 @@ class ContactGrowth:
             part_of=title,
         )
         watch.cases.append((transition, condition))
+
+    def _title(self, watch: Watch, decision: Decision) -> str:
+        """What happens, in names of transitions."""
+        if watch.event.kind == IMPACT:
+            hit = [i for i in decision.closed if watch.now.statuses[i] == OPEN]
+            return "+".join(self.contacts[i].name for i in hit)
+        if watch.event.kind == BREAKS and is_shared(decision.forces, watch.now.of_closed(decision.resting)):
+            return f"{self.contacts[watch.event.contact].name} shares"
+        return watch.title
 
     def _unused(self, name: str) -> str:
         used = {each.name for watch in self._all_watches() for each, _ in watch.cases}

@@ -11,9 +11,10 @@ import numpy as np
 from hybrid.expression.evaluation import Program, expressed
 from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.system.elements import Function
+from hybrid.system.growth import Place
 from hybrid.transform.contacts.equations import Space
 from hybrid.transform.contacts.problem import DEPENDENT, Combination, Level, matrix, outcome
-from hybrid.transform.contacts.statuses import IDLE, OPEN, Statuses
+from hybrid.transform.contacts.statuses import IDLE, OPEN, STICKS
 from hybrid.transform.contacts.view import FORCES, Mechanics, View
 
 # Of a difference that estimates a slope.
@@ -45,24 +46,22 @@ class Held:
 
 def held(
     mechanics: Mechanics,
-    statuses: Statuses,
-    merged: tuple[int | None, ...],
-    place: tuple[float, np.ndarray, np.ndarray],
+    now: Combination,
+    place: Place,
 ) -> Held:
-    """The mode of some statuses; ``place`` is ``(t, x, parameters)`` where it is first entered.
+    """The mode in which ``now`` holds; ``place`` is ``(t, x, parameters)`` where it is first entered.
 
     Forces keep the rates of gaps, and of slips of contacts that stick, at zero. Rounding and the errors of
     the solver would let these drift, so forces also pull them back at the pace ``k`` of the motion, which
     changes nothing where they are zero: ``g'' = -2 k g' - k^2 g`` (Baumgarte).
     """
-    space, view, count = mechanics.space, mechanics.view, len(statuses)
+    space, view, count = mechanics.space, mechanics.view, len(now.statuses)
     normal: list[Any] = [node(0.0)] * count
     tangential: list[Any] = [node(0.0)] * count
-    closed = [i for i, each in enumerate(statuses) if each not in (OPEN, IDLE)]
+    closed = [i for i, each in enumerate(now.statuses) if each not in (OPEN, IDLE)]
     if not closed:
         return Held(expressed([*space.u, *map(node, view.free)]), None, normal, tangential)
-    shared = [None if merged[i] is None else closed.index(merged[i]) for i in closed]  # type: ignore[arg-type]
-    case = Combination(tuple(statuses[i] for i in closed), tuple(shared), (False,) * len(closed))
+    case = now.of_closed(closed)
     exact, rows = mechanics.forces(view, closed), mechanics.rows_of(closed)
     numbers = matrix(mechanics.forces(mechanics.at(*place), closed), case)
     pace = _pace(space, view.moved(_forces(exact, case, numbers), rows, view.free), place)
@@ -76,9 +75,7 @@ def held(
         normal[i] = node(forces[level.row(k)])
         if level.places[k][1] is not None:
             tangential[i] = node(forces[level.across(k)])
-    unknown = {(i, each) for i in _undetermined(mechanics.at(*place), mechanics, statuses) for each in FORCES}
-    pairs = [(i, other) for i, other in enumerate(merged) if other is not None]
-    unknown |= {(i, "tangential") for pair in pairs for i in pair}
+    unknown = _undetermined(mechanics, now, mechanics.at(*place))
     field = expressed([*space.u, *map(node, view.moved(forces, rows, view.free))])
     kept = [each for i in closed for each in (view.gaps[i], view.speeds[mechanics.places[i][0]])]
     kept += [
@@ -88,7 +85,7 @@ def held(
         for row in mechanics.places[i][1:]
         if row
     ]
-    return Held(field, expressed(kept), normal, tangential, frozenset(unknown))
+    return Held(field, expressed(kept), normal, tangential, unknown)
 
 
 def _forces(level: Level, case: Combination, numbers: np.ndarray) -> list[Any]:
@@ -107,7 +104,7 @@ def _slip_drawn_back(mechanics: Mechanics, i: int, pace: float) -> Expression:
     return ZERO if row is None else -pace * mechanics.view.speeds[row]
 
 
-def _pace(space: Space, accelerations: Sequence[Any], place: tuple[float, np.ndarray, np.ndarray]) -> float:
+def _pace(space: Space, accelerations: Sequence[Any], place: Place) -> float:
     """How fast a motion changes: the largest eigenvalue of its linearisation, as a power of two."""
     t, x, parameters = place
     n = space.size
@@ -122,14 +119,20 @@ def _pace(space: Space, accelerations: Sequence[Any], place: tuple[float, np.nda
     return float(2.0 ** np.round(np.log2(size))) if size > STEP else 1.0
 
 
-def _undetermined(view: View, mechanics: Mechanics, statuses: Statuses) -> list[int]:
-    """The contacts whose normal forces are not determined: some could push instead of others."""
-    closed = [i for i, each in enumerate(statuses) if each != OPEN]
-    if IDLE not in statuses:
-        return []
-    rows = [mechanics.places[i][0] for i in closed]
+def _undetermined(mechanics: Mechanics, now: Combination, view: View) -> frozenset[tuple[int, str]]:
+    """The forces that are not determined, as others could take their place."""
+    directions: list[tuple[int, str]] = []
+    rows: list[int] = []
+    for i, status in enumerate(now.statuses):
+        normal, across = mechanics.places[i]
+        for what, row in zip(FORCES, (normal, across), strict=True):
+            if status != OPEN and row is not None and (row == normal or status == STICKS):
+                directions.append((i, what))
+                rows.append(row)
     G = np.array([[view.delassus[i][j] for j in rows] for i in rows], dtype=float)
     sizes = np.sqrt(np.diag(G))
     values, vectors = np.linalg.eigh(G / np.outer(sizes, sizes))
-    free = np.abs(vectors[:, values <= DEPENDENT]).max(axis=1)
-    return [i for i, share in zip(closed, free, strict=True) if share > STEP]
+    free = np.abs(vectors[:, values <= DEPENDENT])
+    return frozenset(
+        each for each, share in zip(directions, free, strict=True) if share.max(initial=0.0) > STEP
+    )

@@ -20,6 +20,8 @@ from hybrid.transform.contacts.statuses import IDLE, OPEN, SIGNS, STICKS, Status
 
 # What is smaller than this share of its terms is zero: it has been computed with rounding.
 NOISE = 1e-9
+# Contacts share what they bear in another way if that leaves so much of the terms until a bound.
+SHARED = 1e-6
 # Rows of a smaller singular value, relative to the largest, depend on each other.
 DEPENDENT = 1e-9
 
@@ -35,21 +37,51 @@ class Combination:
     merged
         By contact: the contact that takes up the friction of this one too, as one of the two decides nothing
         that the other does not, like the feet of a block that lies flat.
+    leans
+        By contact that sticks because others do: its friction as a share of the bound, -1, 0 or 1. What a
+        ladder's two ends bear is not determined, and these are the ends of what may be.
     lifts
         By contact: whether it opens under the normal impulse that it is given, instead of needing more.
     """
 
     statuses: Statuses
     merged: tuple[int | None, ...]
+    leans: tuple[int | None, ...]
     lifts: tuple[bool, ...]
+
+    @classmethod
+    def of(cls, statuses: Sequence[str]) -> Combination:
+        """Contacts each of which has a force of its own."""
+        count = len(statuses)
+        return cls(tuple(statuses), (None,) * count, (None,) * count, (False,) * count)
 
     def sticks(self, i: int) -> bool:
         """Whether a contact has a friction force of its own that keeps it from slipping."""
-        return self.statuses[i] == STICKS and self.merged[i] is None
+        return self.statuses[i] == STICKS and self.merged[i] is None and self.leans[i] is None
 
     def is_held(self, i: int) -> bool:
         """Whether a contact needs a normal force that equations tell."""
         return self.statuses[i] not in (OPEN, IDLE) and not self.lifts[i]
+
+    def of_all(self, contacts: Sequence[int], count: int) -> Combination:
+        """The same for all of ``count`` contacts, of which these are the closed ones."""
+        made = Combination.of([OPEN] * count)
+        statuses, merged, leans = [*made.statuses], [*made.merged], [*made.leans]
+        for k, i in enumerate(contacts):
+            other = self.merged[k]
+            statuses[i], leans[i] = self.statuses[k], self.leans[k]
+            merged[i] = None if other is None else contacts[other]
+        return Combination(tuple(statuses), tuple(merged), tuple(leans), made.lifts)
+
+    def of_closed(self, contacts: Sequence[int]) -> Combination:
+        """The same for some of the contacts, which hold all that are closed."""
+        merged = [self.merged[i] for i in contacts]
+        return Combination(
+            tuple(self.statuses[i] for i in contacts),
+            tuple(None if each is None else contacts.index(each) for each in merged),
+            tuple(self.leans[i] for i in contacts),
+            tuple(self.lifts[i] for i in contacts),
+        )
 
 
 @attrs.frozen(eq=False)
@@ -149,17 +181,17 @@ def _equations(level: Level, case: Combination) -> tuple[list[list[Any]], list[A
     """Forces by rows for a unit of each unknown, and without any; the rows that have a target, with it."""
     size = len(level.before)
     unknowns, start, wanted = [], [0.0] * size, []
-    for i, status in enumerate(case.statuses):
-        across = -SIGNS[status] * level.friction[i] if status in SIGNS else 0.0
+    for i in range(len(case.statuses)):
+        across = _share(level, case, i)
         if case.is_held(i):
             column = [0.0] * size
             column[level.row(i)] = 1.0
-            if status in SIGNS:
+            if across != 0:
                 column[level.across(i)] = across
             unknowns.append(column)
             wanted.append((level.row(i), level.targets[i]))
         start[level.row(i)] = level.given[i]
-        if status in SIGNS:
+        if across != 0:
             start[level.across(i)] = across * level.given[i]
         if case.sticks(i):
             column = [0.0] * size
@@ -167,6 +199,14 @@ def _equations(level: Level, case: Combination) -> tuple[list[list[Any]], list[A
             unknowns.append(column)
             wanted.append((level.across(i), level.stops[i]))
     return unknowns, start, wanted
+
+
+def _share(level: Level, case: Combination, i: int) -> Any:
+    """The friction of a contact for a unit of its normal force, where that is known."""
+    if case.statuses[i] in SIGNS:
+        return -SIGNS[case.statuses[i]] * level.friction[i]
+    lean = case.leans[i]
+    return 0.0 if not lean else lean * level.static[i]
 
 
 def solved_in_numbers(rows: list[list[float]], right: list[float]) -> list[float] | None:

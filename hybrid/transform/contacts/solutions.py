@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import product
+from itertools import combinations, product
 
 import attrs
 import numpy as np
@@ -22,6 +22,11 @@ class Found:
     case: Combination
     outcome: Outcome
 
+    @property
+    def margin(self) -> float:
+        """By how much the case is consistent, in units of the noise."""
+        return min((value / noise for value, noise in self.outcome.conditions if noise > 0.0), default=0.0)
+
 
 def consistent(level: Level, options: Sequence[Sequence[str]], stuck: Sequence[int]) -> list[Found]:
     """The consistent cases of a problem in numbers, those with fewest forces first.
@@ -35,6 +40,8 @@ def consistent(level: Level, options: Sequence[Sequence[str]], stuck: Sequence[i
     """
     found = []
     for case in sorted(_cases(level, options), key=_forces):
+        if any(case.statuses[i] in SIGNS and _cannot_slip(level, case, i) for i in stuck):
+            continue
         reached = outcome(level, case, stuck)
         if reached is not None and holds(reached.conditions):
             found.append(Found(case, reached))
@@ -51,13 +58,50 @@ def _cases(level: Level, options: Sequence[Sequence[str]]) -> Iterator[Combinati
     ]
     for chosen in product(*ways):
         statuses = tuple(status for status, _ in chosen)
-        yield Combination(statuses, merged_in(level, statuses), tuple(lifts for _, lifts in chosen))
+        lifts = tuple(each for _, each in chosen)
+        yield from borne(level, attrs.evolve(Combination.of(statuses), lifts=lifts))
 
 
-def _forces(case: Combination) -> tuple[int, int]:
-    """How many normal forces are to be found; of cases with as many, those that stick come first."""
+def borne(level: Level, case: Combination) -> Iterator[Combination]:
+    """A case by all ways in which contacts that stick may share what they bear, often one."""
+    case = attrs.evolve(case, merged=merged_in(level, case.statuses))
+    rows = [level.row(i) for i in range(len(case.statuses)) if case.is_held(i)]
+    sticking = [i for i in range(len(case.statuses)) if case.sticks(i)]
+    surplus = len(rows) + len(sticking) - _rank(level, [*rows, *map(level.across, sticking)])
+    for chosen in combinations(sticking, surplus):
+        others = [level.across(i) for i in sticking if i not in chosen]
+        if _rank(level, [*rows, *others]) < len(rows) + len(others):
+            continue
+        for shares in product((0, 1, -1), repeat=surplus):
+            leans = dict(zip(chosen, shares, strict=True))
+            yield attrs.evolve(case, leans=tuple(leans.get(i) for i in range(len(case.statuses))))
+
+
+def _cannot_slip(level: Level, case: Combination, i: int) -> bool:
+    """Whether what the other contacts hold keeps a contact from slipping: it sticks with them then."""
+    held = [level.row(k) for k in range(len(case.statuses)) if case.is_held(k)]
+    held += [level.across(k) for k in range(len(case.statuses)) if case.sticks(k)]
+    return _rank(level, [*held, level.across(i)]) == _rank(level, held)
+
+
+def _rank(level: Level, rows: Sequence[int]) -> int:
+    """How many directions of rows do not depend on each other."""
+    if not rows:
+        return 0
+    G = np.array([[level.delassus[i][j] for j in rows] for i in rows], dtype=float)
+    sizes = np.sqrt(np.diag(G))
+    values = np.linalg.eigvalsh(G / np.outer(sizes, sizes))
+    return int(np.count_nonzero(values > DEPENDENT))
+
+
+def _forces(case: Combination) -> tuple[int, int, int]:
+    """How many normal forces are to be found; then those come first that stick, without leaning."""
     held = sum(case.is_held(i) for i in range(len(case.statuses)))
-    return held, -sum(each == STICKS for each in case.statuses)
+    return (
+        held,
+        -sum(each == STICKS for each in case.statuses),
+        sum(each not in (None, 0) for each in case.leans),
+    )
 
 
 def merged_in(level: Level, statuses: Statuses) -> tuple[int | None, ...]:
@@ -75,6 +119,11 @@ def merged_in(level: Level, statuses: Statuses) -> tuple[int | None, ...]:
 def _is_parallel(level: Level, i: int, j: int) -> bool:
     G = level.delassus
     return bool(G[i][i] * G[j][j] - G[i][j] ** 2 <= DEPENDENT * G[i][i] * G[j][j])
+
+
+def is_shared(case: Combination, before: Combination) -> bool:
+    """Whether two cases differ at most in how contacts share what they bear."""
+    return case.statuses == before.statuses
 
 
 def several(level: Level, found: Sequence[Found]) -> list[Found]:
@@ -116,15 +165,9 @@ def stopped(level: Level, still: Sequence[int]) -> Combination:
         if statuses[i] == HELD and not is_implied(level, level.across(i), pushing):
             statuses[i] = STICKS
             pushing.append(level.across(i))
-    return Combination(tuple(statuses), (None,) * len(statuses), (False,) * len(statuses))
+    return Combination.of(statuses)
 
 
 def is_implied(level: Level, row: int, others: Sequence[int]) -> bool:
-    """Whether the direction of a row is a combination of those of other rows."""
-    if not others:
-        return False
-    rows = [*others, row]
-    G = np.array([[level.delassus[i][j] for j in rows] for i in rows], dtype=float)
-    sizes = np.sqrt(np.diag(G))
-    smallest = np.linalg.eigvalsh(G / np.outer(sizes, sizes))[0]
-    return bool(smallest <= DEPENDENT)
+    """Whether the direction of a row is a combination of those of other rows, which are independent."""
+    return _rank(level, [*others, row]) == len(others)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid import simulate
+from hybrid import Contact, mechanics, simulate
 from tests.hybrid.transform.contacts.scenes import G, block, rod
 
 
@@ -52,6 +52,86 @@ class TestBlock:
     def test_static_friction_below_kinetic(self):
         with pytest.raises(hybrid.ModelError, match="no smaller than"):
             block(friction=0.5, static=0.3)
+
+
+def ladder(friction):
+    """A rod of mass 1 and length 2 that leans against a wall; ``phi`` is its angle to the floor."""
+    return mechanics(
+        coordinates=("x", "y", "phi"),
+        velocities=("u", "v", "w"),
+        parameters={"mu": friction, "pull": 0.0},
+        mass=lambda t, x, p: (1.0, 1.0, 1.0 / 3.0),
+        forces=lambda t, x, p: (p.pull * t, -G, 0.0),
+        contacts=[
+            Contact(
+                "floor",
+                gap=lambda t, x, p: x.y - np.sin(x.phi),
+                slip=lambda t, x, p: x.u - np.sin(x.phi) * x.w,
+                friction="mu",
+            ),
+            Contact(
+                "wall",
+                gap=lambda t, x, p: x.x - np.cos(x.phi),
+                slip=lambda t, x, p: x.v + np.cos(x.phi) * x.w,
+                friction="mu",
+            ),
+        ],
+    )
+
+
+class TestLadder:
+    """Four forces of contacts for three coordinates: what each end bears is not determined."""
+
+    @pytest.mark.parametrize("mu", [0.3, 0.6])
+    @pytest.mark.parametrize("beside", [-0.01, 0.01])
+    def test_stands_above_the_smallest_angle(self, mu, beside):
+        """It stands if ``tan(phi) >= (1 - mu^2) / (2 mu)``: then both ends together can bear it."""
+        phi = np.arctan2(1.0 - mu * mu, 2.0 * mu) + beside
+        arc = simulate(ladder(mu), (np.cos(phi), np.sin(phi), phi, 0.0, 0.0, 0.0), (0.0, 0.2))
+        assert arc.status.ok
+        if beside > 0.0:
+            assert all(str(mode).startswith("floor sticks, wall sticks") for mode in arc.mode)
+            np.testing.assert_allclose(arc.x[-1][3:], 0.0, atol=1e-12)
+            assert np.isnan(arc["floor.tangential"]).all()
+        else:
+            assert set(arc.mode) == {"floor slips +, wall slips -"}
+            assert np.abs(arc["floor.gap"]).max() < 1e-12
+
+    def test_is_pulled_off_where_no_share_is_left(self):
+        """A force that grows pulls it from the wall: it leaves where the wall pushes no more."""
+        mu, phi = 0.6, 1.2
+        start = (np.cos(phi), np.sin(phi), phi, 0.0, 0.0, 0.0)
+        arc = simulate(ladder(mu), start, (0.0, 10.0), parameters={"pull": 1.0}, max_jumps=3)
+        # Without a force at the wall: floor T = pull, N = G, and the moments of N and T balance.
+        moves = [jump for jump in arc.jumps if not jump.target.startswith("floor sticks, wall sticks")]
+        assert moves[0].t <= min(mu * G, G / np.tan(phi)) + 1e-9
+        assert moves[0].t > 0.0
+
+    def test_in_a_groove(self):
+        """A disc in a groove of two planes rests, and a moment turns it where both planes let go."""
+        alpha, mu, turn = np.pi / 4, 0.3, 1.0
+        normal = {"left": (np.sin(alpha), np.cos(alpha)), "right": (-np.sin(alpha), np.cos(alpha))}
+        system = mechanics(
+            coordinates=("x", "y", "phi"),
+            velocities=("u", "v", "w"),
+            parameters={"moment": turn},
+            mass=lambda t, x, p: (1.0, 1.0, 0.5),
+            forces=lambda t, x, p: (0.0, -G, p.moment * t),
+            contacts=[
+                Contact(
+                    name,
+                    gap=lambda t, x, p, n=n: n[0] * x.x + n[1] * x.y - 1.0,
+                    slip=lambda t, x, p, n=n: n[1] * x.u - n[0] * x.v + x.w,
+                    friction=mu,
+                )
+                for name, n in normal.items()
+            ],
+        )
+        arc = simulate(system, (0.0, 1.0 / np.cos(alpha), 0.0, 0.0, 0.0, 0.0), (0.0, 6.0))
+        turning = [jump.t for jump in arc.jumps if "slips" in str(jump.target)]
+        # Both at their bounds: N_l + N_r = W sqrt(2) / (1 + mu^2) at 45 degrees.
+        largest = mu * G * np.sqrt(2.0) / (1.0 + mu * mu)
+        assert turning[0] == pytest.approx(largest / turn, abs=1e-9)
 
 
 class TestPainleve:
