@@ -221,7 +221,9 @@ class ContactGrowth:
     def _start(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> str:
         if mode == SETTLING:
             return mode
-        self._check_gaps(t, x, parameters)
+        closes = self._closes(t, x, parameters)
+        if mode is None and not closes:
+            return next(iter(self.made.values())).mode.name
         if mode is not None:
             known = next((each for each in self.made.values() if each.mode.name == mode), None)
             if known is not None:
@@ -238,7 +240,8 @@ class ContactGrowth:
             return SETTLING
         return self._make(decision.target(len(self.contacts)), (t, x, parameters)).mode.name
 
-    def _check_gaps(self, t: float, x: np.ndarray, parameters: np.ndarray) -> None:
+    def _closes(self, t: float, x: np.ndarray, parameters: np.ndarray) -> bool:
+        """Whether a gap counts as closed; an ArgumentError if one is negative."""
         with np.errstate(all="ignore"):
             gaps = self._gap_program.run(self.mechanics.space.values(t, x, parameters))
         for contact, gap in zip(self.contacts, gaps, strict=True):
@@ -247,6 +250,7 @@ class ContactGrowth:
                     f"x0 = {tuple(map(float, x))}: the gap of contact {contact.name!r} is {gap:g}, and "
                     "bodies cannot overlap. Start with a gap that is not negative."
                 )
+        return any(gap <= self.judge.together for gap in gaps)
 
     @cached_property
     def _gap_program(self) -> Program:
