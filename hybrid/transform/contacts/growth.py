@@ -201,20 +201,22 @@ class ContactGrowth:
         self._add(watch, decision, case, self._make(decision.target(len(self.contacts)), place))
 
     def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
-        """Make the mode in which a run starts; whether it was to be made."""
-        with self.lock:
-            before = len(self.made)
-            self._start(t, x, parameters, mode)
-            return len(self.made) > before
-
-    def mode_at(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> str:
-        """The mode in which a run starts.
+        """Make the mode in which a run starts; whether it was to be made.
 
         Raises
         ------
         ArgumentError
             If a gap is negative, or several things may happen.
         """
+        with self.lock:
+            before = len(self.made)
+            self._start(t, x, parameters, mode)
+            return len(self.made) > before
+
+    def mode_at(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> str:
+        """The mode in which a run starts."""
+        if mode is not None:
+            return mode
         with self.lock:
             return self._start(t, x, parameters, mode)
 
