@@ -119,7 +119,8 @@ def _grow(trajectory: Trajectory, code: int) -> None:
     in_turn = code == StatusCode.ACCUMULATION and not run.at_rest
     for last in _recent(trajectory, run.round) if in_turn else [run.last_fired]:
         name = trajectory.system.transition_names[last]
-        if growth.leads_on(name) and growth.extend(name, (trajectory.t, trajectory.x, trajectory.parameters)):
+        place = trajectory.t, trajectory.x, trajectory.parameters
+        if growth.leads_on(name) and growth.extend(name, place, trajectory.system.transition_names):
             raise Unexplored(name)
 
 

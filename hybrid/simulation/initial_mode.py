@@ -78,7 +78,7 @@ def _refused(system: HybridSystem, model: Any, run: Any, verdicts: list[int], al
         for transition in reversed(_against(system, verdicts)):
             if system.growth.leads_on(transition.name):
                 place = float(run.phase), run.y[: system.dimension].copy(), model.parameters
-                system.growth.extend(transition.name, place)
+                system.growth.extend(transition.name, place, system.transition_names)
                 raise Unexplored(transition.name)
     if not allowed:
         raise ArgumentError(

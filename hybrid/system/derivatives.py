@@ -20,7 +20,7 @@ from hybrid.system.variables import Variables
 COMPLEX_STEP = 1e-30
 # The central difference is taken with this step and half of it; the change estimates the error.
 DIFFERENCE_STEP = 2.0**-16
-# States and time are near 1, and so are the terms that may cancel: a difference of them is off by so much.
+# States are near 1, and so are those after a reset, whose terms may cancel: a difference is off by so much.
 ROUNDING = 8.0 * float(np.finfo(float).eps) / DIFFERENCE_STEP
 
 
@@ -119,7 +119,7 @@ def reference_derivative(
     if not np.all(np.isfinite(values)) or not difference.confirms(values):
         return difference
     # A term such as 1e-8*abs(x), without a complex derivative, makes the two differ by its small factor.
-    tolerance = ROUNDING + 1e-9 * difference.size + 2.0 * np.abs(values - difference.values)
+    tolerance = _rounding(function) + 1e-9 * difference.size + 2.0 * np.abs(values - difference.values)
     tolerance[np.isinf(difference.tolerance)] = np.inf
     return Reference(t, x, values, tolerance, difference.size, "complex step")
 
@@ -194,11 +194,16 @@ def _central_difference(
     (central, bend), (half_central, half_bend) = coarse, fine
     # States and time are near 1, so values and derivatives are of one size.
     size = np.abs(here).reshape(-1, 1) + np.abs(half_central).max(axis=1, keepdims=True)
-    tolerance = ROUNDING + 1e-7 * size + 4.0 * np.abs(half_central - central)
+    tolerance = _rounding(function) + 1e-7 * size + 4.0 * np.abs(half_central - central)
     # One-sided slopes approach each other as the step shrinks, except at a kink.
     kink = (half_bend > 0.75 * bend) & (half_bend > 1e-6 * size)
     tolerance[kink] = np.inf
     return Reference(t, x, (4.0 * half_central - central) / 3.0, tolerance, size, "central difference")
+
+
+def _rounding(function: ModelFunction) -> float:
+    """How far the derivative of a function may be off by the rounding of states."""
+    return 0.0 if function.completed is None else ROUNDING
 
 
 def _differences(

@@ -7,7 +7,7 @@ repeated with a larger system. Systems stay immutable: each is one stage of its 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
 
@@ -57,8 +57,11 @@ class Growth(Protocol):
         """Whether a transition leads to a mode that the system lacks."""
         ...
 
-    def extend(self, transition: str, place: Place) -> bool:
-        """Make what follows a transition that has ended a run at a place; False if nothing does."""
+    def extend(self, transition: str, place: Place, known: Collection[str]) -> bool:
+        """Make what follows a transition that has ended a run at a place; False if nothing does.
+
+        ``known`` are the transitions of the stage that ran: another thread may have made more since.
+        """
         ...
 
     def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
@@ -90,7 +93,7 @@ class Finished(Growth):
         """Any transition that ends a run may have stood for modes to be made."""
         return True
 
-    def extend(self, transition: str, place: Place) -> bool:
+    def extend(self, transition: str, place: Place, known: Collection[str]) -> bool:
         """Nothing is made."""
         return False
 

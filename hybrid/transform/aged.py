@@ -7,7 +7,7 @@ holds also where nothing else of the perturbation is left: in a rest at a fixed 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from itertools import count
 from typing import Any
 
@@ -166,10 +166,10 @@ class _Growth:
         """Where another order would lead elsewhere."""
         return self.inner.ambiguous
 
-    def extend(self, transition: str, place: Place) -> bool:
+    def extend(self, transition: str, place: Place, known: Collection[str]) -> bool:
         """Make what follows a transition that has ended a run at a place."""
         t, x, parameters = place
-        return self.inner.extend(transition, (t, without_age(self.inner.current, x), parameters))
+        return self.inner.extend(transition, (t, without_age(self.inner.current, x), parameters), known)
 
     def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
         """Make the modes in which a run may start; whether there were any to be made."""

@@ -14,7 +14,7 @@ from hybrid.system.outputs import as_outputs
 from hybrid.system.variables import Variables, as_parameters, as_state
 from hybrid.system.watched import Watched
 from hybrid.transform.contacts.contact import Contact
-from hybrid.transform.contacts.statuses import FREE
+from hybrid.transform.contacts.statuses import FREE, statuses_of
 
 # What coordinates and velocities are.
 NAMES = "be names that can be written as attributes, one or several"
@@ -118,7 +118,7 @@ def mechanics(
     from hybrid.expression.evaluation import expressed
     from hybrid.transform.contacts.decide import LAWS, Judge
     from hybrid.transform.contacts.equations import Space, equations_of
-    from hybrid.transform.contacts.growth import ContactGrowth
+    from hybrid.transform.contacts.growth import ContactGrowth, Origin
     from hybrid.transform.contacts.kinematics import kinematics_of
     from hybrid.transform.contacts.view import Mechanics
 
@@ -141,6 +141,8 @@ def mechanics(
     space = Space(Variables((*q, *u), values))
     equations = equations_of(space, mass, forces, kinetic, potential)
     system = Mechanics(space, equations, tuple(kinematics_of(space, each) for each in touching))
+    if start is not None:
+        statuses_of(touching, arguments.instance("mechanics: start", start, str), "mechanics: start mode")
     judge = Judge(system, arguments.positive("mechanics: together", together), impacts)
     free = expressed([*space.u, *system.view.free])
     functions = [mass, forces, kinetic, potential]
@@ -151,7 +153,6 @@ def mechanics(
         parameters=values,
         modes=[Mode(FREE, free)],
         transitions=[],
-        start=start,
         period=period,
         name=name,
         units={} if units is None else units,
@@ -160,7 +161,13 @@ def mechanics(
         laws=Laws() if laws is None else laws,
         derived_from=Watched([each for each in functions if callable(each)]),
     )
-    return ContactGrowth(judge, original).current
+    called = {
+        **{"coordinates": q, "velocities": u, "contacts": touching, "parameters": parameters},
+        **{"mass": mass, "forces": forces, "kinetic": kinetic, "potential": potential},
+        **{"impacts": impacts, "together": together, "period": period, "name": name, "start": start},
+        **{"units": units, "angles": angles, "outputs": outputs, "laws": laws},
+    }
+    return ContactGrowth(judge, original, Origin(mechanics, called), start).current
 
 
 def _names(what: str, value: Iterable[str]) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import reduce
 from itertools import chain, count, islice, product
 from threading import RLock
@@ -97,7 +97,7 @@ class Splitter(Growth):
         """Whether a transition, or the limit of its chatter, leads to a mode that the system lacks."""
         return transition in self.frontier
 
-    def extend(self, transition: str, place: Place) -> bool:
+    def extend(self, transition: str, place: Place, known: Collection[str]) -> bool:
         """Make the mode to which a transition leads; the place does not matter."""
         with self.lock:
             self._make([self.frontier[transition]], 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import cached_property, reduce
 from itertools import chain, count
 from threading import RLock
@@ -81,11 +81,22 @@ class Made:
     watches: list[Watch]
 
 
+@attrs.frozen(eq=False)
+class Origin:
+    """The call that has made a system: copies are made by it."""
+
+    make: Callable[..., HybridSystem]
+    called: Mapping[str, Any]
+
+
 class ContactGrowth:
     """Makes the modes of a mechanical system and the transitions between them, as runs need them."""
 
-    def __init__(self, judge: Judge, original: HybridSystem, called: Any = ()) -> None:
-        self.judge, self.original, self.called = judge, original, called
+    def __init__(
+        self, judge: Judge, original: HybridSystem, origin: Origin, start: str | None = None
+    ) -> None:
+        self.judge, self.original, self.origin, self.start = judge, original, origin, start
+        self.called = origin.called
         self.mechanics = judge.mechanics
         self.written: dict[Any, Any] = {}
         self.lock = RLock()
@@ -105,11 +116,11 @@ class ContactGrowth:
             "settle",
         )
         sample = self.original.variables
-        start = 0.0, np.ones(sample.dimension), sample.defaults
-        self._make(Combination.of([OPEN] * count), start)
+        anywhere = 0.0, np.ones(sample.dimension), sample.defaults
+        self._make(Combination.of([OPEN] * count), anywhere)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return self.called
+        return _made_again, (self.origin.make, self.origin.called)
 
     @property
     def contacts(self) -> list[Contact]:
@@ -127,18 +138,21 @@ class ContactGrowth:
         """Whether a transition stands for cases that have not been made."""
         return transition in self.frontier
 
-    def extend(self, transition: str, place: Place) -> bool:
+    def extend(self, transition: str, place: Place, known: Collection[str]) -> bool:
         """Make what happens at the end of a run; False if nothing can: the run ends there."""
         with self.lock:
             watch = self.frontier[transition]
             decision = self.judge.decide(watch.event, watch.now, *place)
             if isinstance(decision, Undecided):
-                known = watch.undecided is not None and watch.undecided.name == decision.name
                 watch.undecided = decision
                 self.told[transition] = self._why(watch, decision, self.mechanics.at(*place))
-                self.stage = None if not known else self.stage
-                return not known
+                ends = self._frontier_name(watch, decision.name) in known
+                self.stage = self.stage if ends else None
+                return not ends
             if decision in watch.decisions:
+                made, _ = watch.cases[watch.decisions.index(decision)]
+                if made.name not in known:
+                    return True
                 # It holds in numbers and not in the compiled code: all depends on rounding.
                 self.told[transition] = "What happens there depends on rounding."
                 return False
@@ -221,6 +235,7 @@ class ContactGrowth:
             return self._start(t, x, parameters, mode)
 
     def _start(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> str:
+        mode = self.start if mode is None else mode
         if mode == SETTLING:
             return mode
         closes = self._closes(t, x, parameters)
@@ -420,3 +435,10 @@ class ContactGrowth:
                 statuses[i] = status
             names.append(repr(mode_name(self.contacts, tuple(statuses))))
         return " or ".join(names)
+
+
+def _made_again(make: Callable[..., HybridSystem], called: Mapping[str, Any]) -> ContactGrowth:
+    """The growth of a system that has been pickled."""
+    growth = make(**called).growth
+    assert isinstance(growth, ContactGrowth), "the call makes a system that grows"
+    return growth

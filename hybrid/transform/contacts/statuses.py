@@ -35,8 +35,8 @@ def mode_name(contacts: Sequence[Contact], statuses: Statuses) -> str:
     return ("+" if plain else ", ").join(labels) or FREE
 
 
-def statuses_of(contacts: Sequence[Contact], name: str) -> Statuses:
-    """What holds in the mode of a name.
+def statuses_of(contacts: Sequence[Contact], name: str, what: str = "Mode") -> Statuses:
+    """What holds in the mode of a name; ``what`` begins the text of an error.
 
     Raises
     ------
@@ -53,10 +53,10 @@ def statuses_of(contacts: Sequence[Contact], name: str) -> Statuses:
         for part in name.split(", ") if name in known or ", " in name else name.split("+"):
             if part not in known:
                 raise ModelError(
-                    f"Mode {name!r} does not exist. Modes are named by what holds: {FREE!r}, or some "
+                    f"{what} {name!r} does not exist. Modes are named by what holds: {FREE!r}, or some "
                     f"of {', '.join(map(repr, known))}; joined by '+', by ', ' if there is friction."
                 )
             i, found[i] = known[part]
     if mode_name(contacts, tuple(found)) != name:
-        raise ModelError(f"Mode {name!r} does not exist; {mode_name(contacts, tuple(found))!r} does.")
+        raise ModelError(f"{what} {name!r} does not exist; {mode_name(contacts, tuple(found))!r} does.")
     return tuple(found)

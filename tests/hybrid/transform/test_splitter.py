@@ -38,7 +38,7 @@ def test_modes_are_made_where_a_run_needs_them(monkeypatch):
     assert not growth.leads_on("no such")
     assert set(growth.frontier) == set(onward)
     # A mode and its neighbours, not the one across.
-    growth.extend(onward[0], (0.0, np.zeros(2), np.empty(0)))
+    growth.extend(onward[0], (0.0, np.zeros(2), np.empty(0)), onward)
     assert len(growth.current.modes) == 2
     arc = simulate(staged, (1.0, 0.0), (0.0, 6.0))
     expected = simulate(whole, (1.0, 0.0), (0.0, 6.0))

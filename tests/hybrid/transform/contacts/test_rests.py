@@ -1,5 +1,7 @@
 """Contacts that close, hold and open: times and forces in closed form."""
 
+import pickle
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -60,6 +62,74 @@ def table():
         forces=lambda t, x, p: (-G,),
         contacts=[Contact("table", gap=lambda t, x, p: x.y - p.A * np.sin(p.omega * t))],
     )
+
+
+def height(t, x, p):
+    return x.y
+
+
+def one(t, x, p):
+    return (1.0,)
+
+
+def weight(t, x, p):
+    return (-G,)
+
+
+def portable(**given):
+    """A ball made of functions that can be imported, which can be pickled."""
+    floor = Contact("floor", gap=height, restitution=0.5)
+    return mechanics(
+        coordinates=("y",), velocities=("v",), mass=one, forces=weight, contacts=[floor], **given
+    )
+
+
+class TestSystem:
+    def test_is_pickled_with_what_it_needs(self):
+        system = portable()
+        arc = simulate(system, (1.0, 0.0), (0.0, 3.0))
+        for each in (system, arc.system):
+            again = simulate(pickle.loads(pickle.dumps(each)), (1.0, 0.0), (0.0, 3.0))
+            assert again.mode[-1] == "floor"
+            assert again.jumps[-1].t == pytest.approx(arc.jumps[-1].t, abs=1e-13)
+        end = pickle.loads(pickle.dumps(arc)).end
+        assert set(simulate(portable(), end, (end.t, 4.0)).mode) == {"floor"}
+
+    def test_a_start_that_the_system_names(self):
+        assert set(simulate(portable(start="floor"), (0.0, 0.0), (0.0, 1.0)).mode) == {"floor"}
+        with pytest.raises(hybrid.ModelError, match="start mode 'ceiling'"):
+            portable(start="ceiling")
+
+    def test_a_start_with_a_negative_gap(self):
+        with pytest.raises(hybrid.ArgumentError, match=r"gap of contact 'floor' is -0\.1"):
+            simulate(portable(), (-0.1, 0.0), (0.0, 1.0))
+
+    def test_many_runs_and_orbits(self):
+        """A ball on a table: the runs of a crew, and an orbit of one impact a period."""
+        system = mechanics(
+            coordinates=("y",),
+            velocities=("v",),
+            parameters={"A": 0.02, "omega": 25.0, "e": 0.8},
+            period=lambda p: 2.0 * np.pi / p.omega,
+            mass=one,
+            forces=weight,
+            contacts=[Contact("table", gap=lambda t, x, p: x.y - p.A * np.sin(p.omega * t), restitution="e")],
+        )
+        ends = hybrid.simulate_many(system, {"y": [0.5, 1.0], "v": 0.0}, (0.0, 1.0))
+        alone = simulate(system, (1.0, 0.0), (0.0, 1.0))
+        np.testing.assert_allclose(ends.x_end[1], alone.x[-1], atol=1e-10)
+        assert hybrid.equilibrium(beam(), (0.0, 0.0, 0.0, 0.0)).mode == "left+right"
+        # The ball leaves with g T / 2, so cos(phase) = (1 - e) / (1 + e) g T / (2 A omega).
+        period = 2.0 * np.pi / 25.0
+        phase = np.arccos(0.2 / 1.8 * G * period / 2.0 / (0.02 * 25.0))
+        orbit = hybrid.periodic_orbit(
+            system,
+            (0.02 * np.sin(phase) + 1e-9, G * period / 2.0),
+            t0=phase / 25.0,
+        )
+        assert orbit.status.ok
+        trace = np.prod(orbit.multipliers)
+        assert trace.real == pytest.approx(0.64, abs=1e-8)
 
 
 class TestVibratingTable:
