@@ -16,7 +16,7 @@ from hybrid.transform.contacts.decide import Decision, Judge
 from hybrid.transform.contacts.events import BREAKS, SETTLES, SUDDEN, ContactEvent
 from hybrid.transform.contacts.problem import NOISE, SHARED, Combination, Level, Outcome, matrix, outcome
 from hybrid.transform.contacts.solutions import is_shared, stopped
-from hybrid.transform.contacts.statuses import OPEN, STICKS
+from hybrid.transform.contacts.statuses import OPEN, SIGNS, STICKS
 from hybrid.transform.contacts.view import Mechanics, View
 
 
@@ -68,6 +68,8 @@ class Happening:
         view, numbers, decision = self.mechanics.view, self.mechanics.at(*place), self.decision
         conditions: list[Expression] = []
         state: list[Expression] | None = None
+        if self.event.kind not in SUDDEN:
+            conditions += self._stopped()
         if self.event.kind in SUDDEN:
             conditions += [*self._closed(), *self._approaching()]
             asked: list[Expression] = []
@@ -107,6 +109,13 @@ class Happening:
         if self.event.kind != SETTLES:
             conditions += _consistent(reached)
         return (level, reached), forces
+
+    def _stopped(self) -> Iterator[Expression]:
+        """That other slips end at an event, or do not."""
+        for i, sign in zip(self.decision.resting, self.decision.sliding, strict=True):
+            if self.now.statuses[i] in SIGNS and i != self.event.contact:
+                still = self.judge.stops(self.event, self.mechanics.view, i)
+                yield Not(still) if sign else still
 
     def _closed(self) -> Iterator[Expression]:
         """That these gaps are closed, of those that the mode and the event do not close, and no others."""

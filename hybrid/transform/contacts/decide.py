@@ -148,11 +148,15 @@ class Judge:
                 sliding = [0 if closed.index(i) in still else self._sliding(moving, i) for i in resting]
         else:
             moving, resting = view, [*closed]
-            sliding = [
-                0 if event.kind == STOPS and i == event.contact else SIGNS.get(statuses[i], 0) for i in closed
-            ]
+            sliding = [0 if self.stops(event, view, i) else SIGNS.get(statuses[i], 0) for i in closed]
         parts = tuple(closed), tuple(approaching), impulses
         return self._rest(event, now, parts, moving, resting, sliding)
+
+    def stops(self, event: ContactEvent, view: View, i: int) -> Any:
+        """Whether a slip ends at an event that keeps velocities: the event's, or another one with it."""
+        if event.kind == STOPS and i == event.contact:
+            return True
+        return self.is_still(view, self.mechanics.places[i][1])
 
     def is_bounce(self, event: ContactEvent, closed: Sequence[int]) -> bool:
         """Whether an impact is one of a single contact without friction, which nothing needs to be asked of.

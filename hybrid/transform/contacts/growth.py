@@ -13,7 +13,7 @@ import numpy as np
 
 from hybrid.errors import ArgumentError
 from hybrid.expression.evaluation import Program, expressed, scalar
-from hybrid.expression.nodes import Expression, Number, add, node
+from hybrid.expression.nodes import Expression, Number, node
 from hybrid.expression.operations import And, Not
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
@@ -157,7 +157,8 @@ class ContactGrowth:
                 self.told[transition] = "What happens there depends on rounding."
                 return False
             for each in self._alike(watch, decision):
-                self._write(each, decision, place)
+                if decision not in each.decisions:
+                    self._write(each, decision, place)
             self._remark(watch, decision, place)
             self.stage = None
             return True
@@ -194,14 +195,17 @@ class ContactGrowth:
         return Program([node(0.5 * dot(u, [dot(row, u) for row in self.mechanics.equations.mass]))])
 
     def _alike(self, watch: Watch, decision: Decision) -> list[Watch]:
-        """The events that a decision is about: an impact of several contacts is one of each of them."""
-        if watch.event.kind != IMPACT:
+        """The events that a decision is about: what happens to several contacts is an event of each of them."""
+        if watch.event.kind == SETTLES:
             return [watch]
         made = next(each for each in self.made.values() if each.mode.name == watch.source)
+        after = decision.target(len(self.contacts)).statuses
+        changed = [i for i, each in enumerate(watch.now.statuses) if each != after[i]]
+        concerned = decision.closed if watch.event.kind == IMPACT else changed
         return [
             each
             for each in made.watches
-            if each.event.kind == IMPACT and each.event.contact in decision.closed
+            if each is watch or (each.event.kind == watch.event.kind and each.event.contact in concerned)
         ]
 
     def _write(self, watch: Watch, decision: Decision, place: Place) -> None:
@@ -306,12 +310,9 @@ class ContactGrowth:
             yield watch(OPENS, Guard(scalar(forces.normal[i]), -1), f"{name} opens")
             row = self.mechanics.places[i][1]
             if now.sticks(i):
-                group = [j for j, by in enumerate(now.merged) if j == i or by == i]
-                most = add(*(view.static[j] * forces.normal[j] for j in group))
                 for sign in (1, -1):
-                    yield watch(
-                        BREAKS, Guard(scalar(most - sign * forces.tangential[i]), -1), f"{name} slips"
-                    )
+                    room = forces.bounds[i] - sign * forces.tangential[i]
+                    yield watch(BREAKS, Guard(scalar(room), -1), f"{name} slips")
             elif status in SIGNS:
                 assert row is not None, "a contact slips along a direction"
                 yield watch(STOPS, Guard(scalar(SIGNS[status] * view.speeds[row]), -1), f"{name} stops")

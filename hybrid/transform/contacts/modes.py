@@ -13,7 +13,7 @@ from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.system.elements import Function
 from hybrid.system.growth import Place
 from hybrid.transform.contacts.equations import Space
-from hybrid.transform.contacts.problem import DEPENDENT, Combination, Level, matrix, outcome
+from hybrid.transform.contacts.problem import DEPENDENT, Combination, Level, bound, matrix, outcome
 from hybrid.transform.contacts.statuses import IDLE, OPEN, STICKS
 from hybrid.transform.contacts.view import FORCES, Mechanics, View
 
@@ -31,8 +31,9 @@ class Held:
         ``f(t, x, p)``.
     holds
         What it keeps at zero: gaps, their rates, slips of what sticks; None without a closed contact.
-    normal, tangential
-        By contact: the forces, by one choice where several would do.
+    normal, tangential, bounds
+        By contact: the forces, by one choice where several would do, and the largest friction of one that
+        sticks.
     undetermined
         Names ``(contact, "normal")`` of those.
     """
@@ -41,6 +42,7 @@ class Held:
     holds: Function | None
     normal: list[Expression]
     tangential: list[Expression]
+    bounds: list[Expression]
     undetermined: frozenset[tuple[int, str]] = frozenset()
 
 
@@ -58,9 +60,10 @@ def held(
     space, view, count = mechanics.space, mechanics.view, len(now.statuses)
     normal: list[Any] = [node(0.0)] * count
     tangential: list[Any] = [node(0.0)] * count
+    bounds: list[Any] = [node(0.0)] * count
     closed = [i for i, each in enumerate(now.statuses) if each not in (OPEN, IDLE)]
     if not closed:
-        return Held(expressed([*space.u, *map(node, view.free)]), None, normal, tangential)
+        return Held(expressed([*space.u, *map(node, view.free)]), None, normal, tangential, [])
     case = now.of_closed(closed)
     exact, rows = mechanics.forces(view, closed), mechanics.rows_of(closed)
     numbers = matrix(mechanics.forces(mechanics.at(*place), closed), case)
@@ -75,6 +78,8 @@ def held(
         normal[i] = node(forces[level.row(k)])
         if level.places[k][1] is not None:
             tangential[i] = node(forces[level.across(k)])
+        if case.sticks(k):
+            bounds[i] = node(bound(level, case, k, forces))
     unknown = _undetermined(mechanics, now, mechanics.at(*place))
     field = expressed([*space.u, *map(node, view.moved(forces, rows, view.free))])
     kept = [each for i in closed for each in (view.gaps[i], view.speeds[mechanics.places[i][0]])]
@@ -85,7 +90,7 @@ def held(
         for row in mechanics.places[i][1:]
         if row
     ]
-    return Held(field, expressed(kept), normal, tangential, unknown)
+    return Held(field, expressed(kept), normal, tangential, bounds, unknown)
 
 
 def _forces(level: Level, case: Combination, numbers: np.ndarray) -> list[Any]:

@@ -15,6 +15,8 @@ from typing import Any
 import attrs
 import numpy as np
 
+from hybrid.expression.nodes import Expression
+from hybrid.expression.operations import Absolute
 from hybrid.transform.contacts.linear import dot, solved
 from hybrid.transform.contacts.statuses import IDLE, OPEN, SIGNS, STICKS, Statuses
 
@@ -236,12 +238,26 @@ def _conditions(
             yield (forces[row] - level.given[i]) * level.delassus[row][row], level.noise[row]
         if case.sticks(i):
             across = level.across(i)
-            group = [j for j, by in enumerate(case.merged) if j == i or by == i]
-            most = sum(level.static[j] * forces[level.row(j)] for j in group)
+            most = bound(level, case, i, forces)
             for side in (1, -1):
                 yield (most - side * forces[across]) * level.delassus[across][across], level.noise[across]
         elif status in SIGNS and i in stuck:
             yield SIGNS[status] * after[level.across(i)], level.noise[level.across(i)]
+
+
+def bound(level: Level, case: Combination, i: int, forces: Sequence[Any]) -> Any:
+    """The largest friction of a contact that sticks, with that of the contacts whose friction it takes up.
+
+    Theirs counts as it acts along its own direction, which may be longer.
+    """
+    own = level.across(i)
+    most = level.static[i] * forces[level.row(i)]
+    for j, by in enumerate(case.merged):
+        if by == i:
+            entry = level.delassus[own][level.across(j)]
+            size = Absolute(entry) if isinstance(entry, Expression) else abs(entry)
+            most = most + level.static[j] * forces[level.row(j)] * size / level.delassus[own][own]
+    return most
 
 
 def holds(conditions: Sequence[tuple[float, float]]) -> bool:
