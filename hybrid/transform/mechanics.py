@@ -123,6 +123,8 @@ def mechanics(
     from hybrid.transform.contacts.view import Mechanics
 
     q, u = (_names(what, value) for what, value in (("coordinates", coordinates), ("velocities", velocities)))
+    if set(q) & set(u):
+        raise ModelError(f"mechanics: velocities must not have names of coordinates; got {', '.join(u)}.")
     if len(q) != len(u):
         raise ModelError(
             "mechanics: coordinates and velocities must be as many, since these are the rates of those; got "
@@ -137,6 +139,9 @@ def mechanics(
     )
     for i, each in enumerate(touching):
         arguments.instance(f"mechanics: contacts[{i}]", each, Contact)
+    names = [each.name for each in touching]
+    if len(set(names)) < len(names):
+        raise ModelError(f"mechanics: contacts must have names of their own; got {', '.join(names)}.")
     values = as_parameters({} if parameters is None else parameters)
     space = Space(Variables((*q, *u), values))
     equations = equations_of(space, mass, forces, kinetic, potential)
@@ -148,6 +153,10 @@ def mechanics(
     functions = [mass, forces, kinetic, potential]
     for each in touching:
         functions += [each.gap, each.slip, each.restitution, each.friction, each.static]
+    own = as_outputs({} if outputs is None else outputs, "mechanics")
+    taken = sorted(own.keys() & system.outputs.keys())
+    if taken:
+        raise ModelError(f"mechanics: outputs: {taken[0]!r} is told of a contact. Choose another name.")
     original = HybridSystem(
         state=(*q, *u),
         parameters=values,
@@ -157,7 +166,7 @@ def mechanics(
         name=name,
         units={} if units is None else units,
         angles={} if angles is None else angles,
-        outputs={**as_outputs({} if outputs is None else outputs, "mechanics"), **system.outputs},
+        outputs={**own, **system.outputs},
         laws=Laws() if laws is None else laws,
         derived_from=Watched([each for each in functions if callable(each)]),
     )

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from numbers import Real
 from typing import Any
 
 import attrs
+import numpy as np
 
 from hybrid.errors import ModelError, shown
 from hybrid.system.elements import Function
@@ -12,6 +14,8 @@ from hybrid.system.portable import Portable
 
 # A number, the name of a parameter, or a function of (t, x, p).
 Coefficient = float | str | Function
+# Names of modes.
+TAKEN = "free", "settles", "begins"
 MEANING = "be a number, the name of a parameter, or a function of (t, x, p)"
 
 
@@ -61,10 +65,11 @@ class Contact(Portable):
     static: Coefficient | None = attrs.field(default=None, kw_only=True)
 
     def __attrs_post_init__(self) -> None:
-        if not isinstance(self.name, str) or not self.name or any(each in self.name for each in ",+"):
+        if not _is_name(self.name):
             raise ModelError(
-                f"Contact: name must be a non-empty text without ',' and '+', which join names in those of "
-                f"modes; got {shown(self.name)}."
+                "Contact: name must be a non-empty text without ',' and '+', which join names in those of "
+                f"modes, not one of {', '.join(map(repr, TAKEN))}, and not end in 'sticks', 'slips -' or "
+                f"'idle'; got {shown(self.name)}."
             )
         for what in ("gap", "slip"):
             function = getattr(self, what)
@@ -89,7 +94,7 @@ class Contact(Portable):
     def _check(self, what: str, value: Any, most: float | None) -> None:
         if callable(value) or (isinstance(value, str) and value):
             return
-        number = value if isinstance(value, int | float) and not isinstance(value, bool) else None
+        number = float(value) if isinstance(value, Real) and not isinstance(value, bool | np.bool_) else None
         if number is None:
             raise ModelError(f"{self.title}: {what} must {MEANING}; got {shown(value)}.")
         if not 0.0 <= number <= (number if most is None else most) or number == float("inf"):
@@ -107,9 +112,15 @@ class Contact(Portable):
         return self.slip is not None and not (_is_zero(self.friction) and self.static is None)
 
 
+def _is_name(name: Any) -> bool:
+    if not isinstance(name, str) or not name or name in TAKEN:
+        return False
+    return not any(each in name for each in ",+") and not name.endswith((" sticks", " slips -", " idle"))
+
+
 def _is_zero(value: Any) -> bool:
     return _are_numbers(value) and value == 0
 
 
 def _are_numbers(*values: Any) -> bool:
-    return all(isinstance(each, int | float) and not isinstance(each, bool) for each in values)
+    return all(isinstance(each, Real) and not isinstance(each, bool | np.bool_) for each in values)

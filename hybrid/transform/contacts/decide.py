@@ -247,6 +247,15 @@ class Judge:
         nothing = ContactEvent(SETTLES), Combination.of([OPEN] * len(rows))
         return self._rest(*nothing, (tuple(resting), (), ()), view, resting, sliding)
 
+    def is_hit(self, t: float, x: np.ndarray, parameters: np.ndarray) -> bool:
+        """Whether a contact approaches at a start whose gap is negative by rounding."""
+        view = self.mechanics.at(t, x, parameters)
+        rows = [normal for normal, _ in self.mechanics.places]
+        return any(
+            gap < 0.0 and view.speeds[row] < -NOISE * view.fast[row]
+            for gap, row in zip(view.gaps, rows, strict=True)
+        )
+
     def named(self, statuses: Statuses, t: float, x: np.ndarray, parameters: np.ndarray) -> Combination:
         """The statuses of a mode that a call names, and how the contacts share what they bear there."""
         closed = [i for i, each in enumerate(statuses) if each != OPEN]

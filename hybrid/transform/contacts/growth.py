@@ -28,6 +28,7 @@ from hybrid.transform.contacts.modes import Held, held
 from hybrid.transform.contacts.order import order_matters
 from hybrid.transform.contacts.problem import Combination
 from hybrid.transform.contacts.solutions import is_shared
+from hybrid.transform.contacts.starts import Starts
 from hybrid.transform.contacts.statuses import (
     IDLE,
     OPEN,
@@ -37,7 +38,7 @@ from hybrid.transform.contacts.statuses import (
 )
 from hybrid.transform.contacts.view import FORCES, View
 
-SETTLING = "settles"
+SETTLING, BEGINNING = "settles", "begins"
 # A gain of kinetic energy below this share is rounding.
 GAIN = 1e-9
 
@@ -107,17 +108,22 @@ class ContactGrowth:
         self.notes: dict[str, None] = {}
         # Transitions of impacts whose order would matter, each with the names of the contacts.
         self.ambiguous: dict[str, str] = {}
+        self.starts = Starts(self.mechanics, judge.together)
+        self.begins = False
         count = len(self.mechanics.contacts)
+        always = Guard(scalar(Number(1)), +1, at_start=True)
+        nothing = Combination.of([OPEN] * count)
+        self.beginning = Watch(BEGINNING, nothing, ContactEvent(IMPACT), always, "begin")
         self.settling = Watch(
             SETTLING,
-            Combination.of([OPEN] * count),
+            nothing,
             ContactEvent(SETTLES),
-            Guard(scalar(Number(1)), +1, at_start=True),
+            always,
             "settle",
         )
         sample = self.original.variables
         anywhere = 0.0, np.ones(sample.dimension), sample.defaults
-        self._make(Combination.of([OPEN] * count), anywhere)
+        self._make(nothing, anywhere)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _made_again, (self.origin.make, self.origin.called)
@@ -195,8 +201,8 @@ class ContactGrowth:
         return Program([node(0.5 * dot(u, [dot(row, u) for row in self.mechanics.equations.mass]))])
 
     def _alike(self, watch: Watch, decision: Decision) -> list[Watch]:
-        """The events that a decision is about: what happens to several contacts is an event of each of them."""
-        if watch.event.kind == SETTLES:
+        """The events that a decision is about: several contacts that change have one each."""
+        if watch.source in (SETTLING, BEGINNING):
             return [watch]
         made = next(each for each in self.made.values() if each.mode.name == watch.source)
         after = decision.target(len(self.contacts)).statuses
@@ -227,9 +233,8 @@ class ContactGrowth:
             If a gap is negative, or several things may happen.
         """
         with self.lock:
-            before = len(self.made)
             self._start(t, x, parameters, mode)
-            return len(self.made) > before
+            return self.stage is None
 
     def mode_at(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> str:
         """The mode in which a run starts."""
@@ -239,43 +244,36 @@ class ContactGrowth:
             return self._start(t, x, parameters, mode)
 
     def _start(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> str:
-        mode = self.start if mode is None else mode
-        if mode == SETTLING:
+        place, mode = (t, x, parameters), self.start if mode is None else mode
+        if mode in (SETTLING, BEGINNING):
             return mode
-        closes = self._closes(t, x, parameters)
-        if mode is None and not closes:
-            return next(iter(self.made.values())).mode.name
+        known = {each.mode.name: now for now, each in self.made.items()}
+        statuses = None
         if mode is not None:
-            known = next((each for each in self.made.values() if each.mode.name == mode), None)
-            if known is not None:
-                return mode
-            statuses = statuses_of(self.contacts, mode)
-            return self._make(self.judge.named(statuses, t, x, parameters), (t, x, parameters)).mode.name
-        decision = self.judge.start(t, x, parameters)
+            statuses = known[mode].statuses if mode in known else statuses_of(self.contacts, mode)
+        closes = self.starts.closes(place, statuses)
+        if statuses is None:
+            return self._closed_start(place) if closes else next(iter(known))
+        if mode is not None and mode in known:
+            return mode
+        return self._make(self.judge.named(statuses, *place), place).mode.name
+
+    def _closed_start(self, place: Place) -> str:
+        """The mode of a start at which gaps are closed."""
+        if self.judge.is_hit(*place):
+            # A gap that is negative by rounding is not seen to close: the impact is at the start.
+            self.stage = self.stage if self.begins else None
+            self.begins = True
+            return BEGINNING
+        decision = self.judge.start(*place)
         if isinstance(decision, Undecided):
             if decision.name == SEVERAL_CASES:
                 raise ArgumentError(
-                    f"x0 = {tuple(map(float, x))} may go on in more than one mode: {self._cases(decision)}. "
-                    "Choose one with mode=."
+                    f"x0 = {tuple(map(float, place[1]))} may go on in more than one mode: "
+                    f"{self._cases(decision)}. Choose one with mode=."
                 )
             return SETTLING
-        return self._make(decision.target(len(self.contacts)), (t, x, parameters)).mode.name
-
-    def _closes(self, t: float, x: np.ndarray, parameters: np.ndarray) -> bool:
-        """Whether a gap counts as closed; an ArgumentError if one is negative."""
-        with np.errstate(all="ignore"):
-            gaps = self._gap_program.run(self.mechanics.space.values(t, x, parameters))
-        for contact, gap in zip(self.contacts, gaps, strict=True):
-            if gap < -self.judge.together:
-                raise ArgumentError(
-                    f"x0 = {tuple(map(float, x))}: the gap of contact {contact.name!r} is {gap:g}, and "
-                    "bodies cannot overlap. Start with a gap that is not negative."
-                )
-        return any(gap <= self.judge.together for gap in gaps)
-
-    @cached_property
-    def _gap_program(self) -> Program:
-        return Program(self.mechanics.view.gaps)
+        return self._make(decision.target(len(self.contacts)), place).mode.name
 
     def _make(self, now: Combination, place: Place) -> Made:
         """The mode in which ``now`` holds."""
@@ -354,6 +352,8 @@ class ContactGrowth:
 
     def _all_watches(self) -> Iterator[Watch]:
         yield self.settling
+        if self.begins:
+            yield self.beginning
         for each in self.made.values():
             yield from each.watches
 
@@ -366,9 +366,10 @@ class ContactGrowth:
             if onward is not None:
                 transitions.append(onward)
         modes = [each.mode for each in self.made.values()]
-        settling = Mode(SETTLING, next(iter(self.made.values())).mode.field)
+        field = next(iter(self.made.values())).mode.field
+        moments = [SETTLING, BEGINNING] if self.begins else [SETTLING]
         given: dict[str, Any] = {
-            "modes": [*modes, settling],
+            "modes": [*modes, *(Mode(name, field) for name in moments)],
             "transitions": transitions,
             "outputs": {**self.original.outputs, **self._outputs()},
             "notes": (*self.original.notes, *self.notes),
@@ -398,7 +399,7 @@ class ContactGrowth:
         """Gap and forces of each contact, in the modes that have been made."""
         found = {}
         modes = [(each.mode.name, each.forces) for each in self.made.values()]
-        modes.append((SETTLING, modes[0][1]))
+        modes += [(name, modes[0][1]) for name in ([SETTLING, BEGINNING] if self.begins else [SETTLING])]
         for i, contact in enumerate(self.contacts):
             for what in FORCES if contact.has_friction else FORCES[:1]:
                 name = f"{contact.name}.{what}"
@@ -415,7 +416,7 @@ class ContactGrowth:
     def _why(self, watch: Watch, undecided: Undecided, view: View) -> str:
         """Why a run ends where nothing is decided."""
         names = ", ".join(repr(self.contacts[i].name) for i in undecided.contacts)
-        what = "impact" if undecided.sudden else "accelerations"
+        what = "impulses" if undecided.sudden else "accelerations"
         friction = ", ".join(
             f"{view.friction[i]:g} at {self.contacts[i].name!r}"
             for i in undecided.contacts

@@ -9,6 +9,7 @@ import attrs
 
 from hybrid.errors import ModelError, unknown_name
 from hybrid.expression.derivatives import derivative
+from hybrid.expression.graph import mentions
 from hybrid.expression.nodes import ZERO, Expression, add, node
 from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.contacts.equations import Space
@@ -90,12 +91,14 @@ def kinematics_of(space: Space, contact: Contact) -> Kinematics:
 
 def _slip_row(space: Space, contact: Contact, slip: Callable[..., Any]) -> Row:
     speed = space.one(f"{contact.title}: slip", slip)
+    if not mentions(speed, space.u):
+        raise ModelError(f"{contact.title}: slip depends on no velocity, so no friction can change it.")
     weights = space.without_velocities(
         f"{contact.title}: slip must be affine in the velocities, a sum of multiples of them.",
         [derivative(speed, each) for each in space.u],
     )
     if all(each is ZERO for each in weights):
-        raise ModelError(f"{contact.title}: slip depends on no velocity, so no friction can change it.")
+        raise ModelError(f"{contact.title}: slip must be affine in the velocities.")
     drift = speed - dot(weights, space.u)
     [drift] = space.without_velocities(f"{contact.title}: slip must be affine in the velocities.", [drift])
     return Row(weights, drift, space.rate(add(node(dot(weights, space.u)), drift)))
