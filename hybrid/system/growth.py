@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
+from weakref import WeakKeyDictionary
 
 import attrs
 import numpy as np
@@ -77,12 +78,21 @@ class Finished(Growth):
     """The growth of a system that is made from one stage of another, and stays as it is.
 
     Transitions that stood for modes to be made end its runs.
+
+    Attributes
+    ----------
+    of
+        What made the modes of the stage; it knows what they stand for.
     """
 
     original = None
 
-    def __init__(self) -> None:
+    def __init__(self, of: Growth | None = None) -> None:
         self.written: dict[Any, Any] = {}
+        self.of = of
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Finished, ()
 
     @property
     def current(self) -> None:
@@ -104,7 +114,11 @@ class Finished(Growth):
 
 def finished(system: Any) -> Any:
     """A system with the modes that it has; nothing that is made from it has more."""
-    return system if system.growth is None else attrs.evolve(system, growth=Finished())
+    if system.growth is None or isinstance(system.growth, Finished):
+        return system
+    if system not in _FINISHED:
+        _FINISHED[system] = attrs.evolve(system, growth=Finished(system.growth))
+    return _FINISHED[system]
 
 
 def stage_of(system: Any) -> Any:
@@ -118,6 +132,10 @@ def grows(value: object) -> bool:
     methods = ("leads_on", "extend", "place")
     is_object = not isinstance(value, type) and isinstance(getattr(value, "written", None), dict)
     return is_object and all(callable(getattr(value, name, None)) for name in methods)
+
+
+# One object for each stage, so that what is compiled for one call serves the next.
+_FINISHED: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
 
 
 class Unexplored(Exception):

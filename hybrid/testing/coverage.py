@@ -21,6 +21,7 @@ from hybrid.system.watched import is_of_library
 from hybrid.testing.case import MOST_OF_WHOLE, Case, lasting
 from hybrid.testing.errors import PropertyError
 from hybrid.testing.starts import nearest_zero, start_in
+from hybrid.transform.contacts.growth import contacts_of
 from hybrid.testing.symmetry import is_mirrored
 
 FIRES = "Every guard can fire, and no condition refuses every crossing"
@@ -42,6 +43,10 @@ PLACES = 20
 ON_GUARD = 1e-9
 # How runs end that reach the end of their span, or an end that the model provides.
 AS_MEANT = (StatusCode.SUCCESS, StatusCode.START_BEYOND, StatusCode.TERMINAL)
+
+
+# What a run is to show of a contact.
+IMPACTS_OF = "impacts of contact {!r}"
 
 
 @attrs.frozen(eq=False)
@@ -73,6 +78,11 @@ class Coverage:
         """Nothing seen yet of a system."""
         # A transition at the start corrects the mode of a start, and drawn starts need none.
         flown = [each for each in system.transitions if not each.guard.at_start]
+        growth = contacts_of(system)
+        if growth is not None:
+            # Modes and transitions are made when runs need them, so none is missed; a contact may be.
+            contacts = Counter({IMPACTS_OF.format(each.name): 0 for each in growth.contacts})
+            return cls(system, contacts, Counter(), Counter(), Counter())
         conditional = [each.name for each in flown if each.guard.when is not None and _is_users(each)]
         zeros = ([each.name for each in flown], system.mode_names, conditional)
         jumps, visits, refused = (Counter(dict.fromkeys(names, 0)) for names in zeros)
@@ -85,6 +95,7 @@ class Coverage:
         if arc is None:
             return
         self.jumps.update(jump.transition for jump in arc.jumps if jump.kind != "limit")
+        self.jumps.update(IMPACTS_OF.format(name) for name in impacts_of(case, arc))
         self.lasting.update(str(mode) for mode in np.unique(arc.mode[lasting(arc)]))
         self.visits.update([str(arc.mode[0]), *(jump.target for jump in arc.jumps if jump.target)])
         for transition in self.system.transitions:
@@ -110,6 +121,8 @@ class Coverage:
     def dead_ends(self) -> tuple[str, ...]:
         """Modes that nothing leaves though the state moves there, that nothing enters, that never last."""
         system = self.system
+        if contacts_of(system) is not None:
+            return ()
         left = {each.source for each in system.transitions}
         entered = {name for each in system.transitions for name in (each.target, each.accumulates_to)}
         found = [
@@ -245,6 +258,15 @@ class Coverage:
         raise PropertyError(
             f"{FIRES}: this does not hold for {name}.\n  {line}; no run took it\n  likely: {hint}"
         )
+
+
+def impacts_of(case: Case, arc: HybridArc) -> Iterator[str]:
+    """The contacts that close at the jumps of a run, one after another; none without contacts."""
+    growth = contacts_of(case.system)
+    known = [] if growth is None else [each.name for each in growth.contacts]
+    for jump in arc.jumps:
+        title = case.transition(jump).part_of or ""
+        yield from (name for name in title.split("+") if name in known)
 
 
 def _side(case: Case, guard: Guard | Clock, t: float, x: np.ndarray) -> list[float]:

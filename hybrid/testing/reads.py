@@ -8,6 +8,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from hybrid.expression.evaluation import expressed
 from hybrid.expression.reads import TIME, names_read
 from hybrid.expression.values import TraceError
 from hybrid.system.derivatives import evaluate, sample_points
@@ -15,6 +16,7 @@ from hybrid.system.elements import Reset, Transition
 from hybrid.system.functions import WholeReset, field_function
 from hybrid.system.graph import HybridSystem, as_system, functions_of, laws_of, watched_by
 from hybrid.testing.errors import PropertyError, discard
+from hybrid.transform.contacts.growth import contacts_of
 
 READS = "Every parameter is read, and no number stands in for one"
 _PASSED: WeakKeyDictionary[HybridSystem, dict[str, bool]] = WeakKeyDictionary()
@@ -110,7 +112,8 @@ def check_reads(system: HybridSystem) -> None:
 
 def numbers_read(system: HybridSystem) -> dict[str, float]:
     """The plain numbers that the functions read from modules and closures, by name."""
-    return watched_by(system).numbers()
+    below = () if contacts_of(system) is None else (system.derived_from,)
+    return watched_by(system).joined(*below).numbers()
 
 
 def _all_functions(system: HybridSystem) -> list[Callable[..., Any]]:
@@ -123,6 +126,10 @@ def _all_functions(system: HybridSystem) -> list[Callable[..., Any]]:
         found += law.formulas
     for output in system.outputs.values():
         found += output.functions
+    growth = contacts_of(system)
+    if growth is not None:
+        # Modes are made when runs need them, and each reads some of this.
+        found.append(expressed(growth.mechanics.given))
     for law in laws.across:
         found.append(lambda t, x, p, law=law: law.quantity(t, x, x, p))
     return found

@@ -23,7 +23,8 @@ from hybrid.system.laws import Laws
 from hybrid.system.members import for_each
 from hybrid.testing.case import TIGHT, Case
 from hybrid.testing.engine import LIBRARY, Engine
-from hybrid.testing.starts import start_in
+from hybrid.testing.starts import start_in, start_touching
+from hybrid.transform.contacts.growth import contacts_of
 
 # A range ``(low, high)``, a fixed number, or a strategy of numbers.
 Range = tuple[float, float] | float | SearchStrategy[float]
@@ -212,11 +213,16 @@ def cases(
     solver = check_solver(solver)
     arguments.instance("engine", engine, Engine, "Subclass hybrid.testing.Engine.")
 
+    growth = contacts_of(system)
+    count = 0 if growth is None else len(growth.contacts)
+
     @st.composite
     def drawn_case(draw: Any) -> Case:
         begins, lasts = draw(st.integers(0, GRID)) / (2 * GRID), 0.2 + 0.8 * draw(st.integers(0, GRID)) / GRID
         fraction = draw(st.integers(1, 99)) / 100
-        choice = draw(st.integers(0, len(system.modes) - 1))
+        if count:
+            touching, still = draw(st.sampled_from(_touches(count))), draw(st.booleans())
+        choice = 0 if count else draw(st.integers(0, len(system.modes) - 1))
         names = [
             each.name
             for each in (*system.modes[choice:], *system.modes[:choice])
@@ -228,6 +234,11 @@ def cases(
             t0 = begin + (last - begin) * begins
             t1 = t0 + (last - t0) * lasts
             case = Case(system, p, None, x0, t0, t1, fraction, through, solver, engine, known)
+            if count:
+                found = start_touching(case, touching, still)
+                if found is not None and mode in (None, found.mode):
+                    return found
+                continue
             for name in names:
                 start = start_in(case, name)
                 if start is not None:
@@ -235,6 +246,12 @@ def cases(
         return case
 
     return drawn_case()
+
+
+def _touches(count: int) -> list[tuple[int, ...]]:
+    """The contacts that are closed at a start: none, each alone, all."""
+    alone = [(i,) for i in range(count)]
+    return [(), *alone, *([tuple(range(count))] if count > 1 else [])]
 
 
 def all_laws(system: HybridSystem, given: Mapping[str, Any]) -> Laws:

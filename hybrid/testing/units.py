@@ -15,6 +15,7 @@ from hybrid.system.clocks import Clock, DerivedClock, numbers_of
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem
+from hybrid.system.growth import finished
 from hybrid.system.laws import Laws
 from hybrid.system.moving import moving_numbers
 from hybrid.system.variables import PARAMETERS, STATE, named_values
@@ -56,7 +57,7 @@ _MEASURED: WeakKeyDictionary[HybridSystem, Measured] = WeakKeyDictionary()
 def measured(system: HybridSystem) -> Measured:
     """The system with its units as parameters, cached."""
     if system not in _MEASURED:
-        _MEASURED[system] = _measured(system)
+        _MEASURED[system] = _measured(finished(system))
     return _MEASURED[system]
 
 

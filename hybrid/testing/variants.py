@@ -13,6 +13,7 @@ from hybrid.compiler.compiled import compile_system
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem
+from hybrid.system.growth import finished
 from hybrid.system.laws import Laws
 from hybrid.system.variables import PARAMETERS, named_values
 
@@ -72,7 +73,7 @@ _REORDERED: WeakKeyDictionary[HybridSystem, HybridSystem] = WeakKeyDictionary()
 def altered(system: HybridSystem) -> Altered:
     """The system with parameters to alter it, cached."""
     if system not in _ALTERED:
-        _ALTERED[system] = _altered(system)
+        _ALTERED[system] = _altered(finished(system))
     return _ALTERED[system]
 
 
@@ -82,7 +83,7 @@ def renamed(system: HybridSystem) -> HybridSystem:
         # A mode that has been split, which the system may start in, keeps its name.
         start = system.start
         _RENAMED[system] = attrs.evolve(
-            system,
+            finished(system),
             start=new_name(system.mode_names, start) if start in system.mode_names else start,
             units={},
             outputs={},
@@ -111,7 +112,7 @@ def new_name(names: tuple[str, ...], name: str) -> str:
 def reordered(system: HybridSystem) -> HybridSystem:
     """The system with its transitions in reverse order, cached."""
     if system not in _REORDERED:
-        _REORDERED[system] = attrs.evolve(system, transitions=system.transitions[::-1])
+        _REORDERED[system] = attrs.evolve(finished(system), transitions=system.transitions[::-1])
     return _REORDERED[system]
 
 

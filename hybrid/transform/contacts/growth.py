@@ -17,7 +17,7 @@ from hybrid.expression.nodes import Expression, Number, node
 from hybrid.expression.operations import And, Not
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
-from hybrid.system.growth import Place
+from hybrid.system.growth import Finished, Place
 from hybrid.system.outputs import Formula, Output
 from hybrid.transform.contacts.cases import Happening, Written
 from hybrid.transform.contacts.contact import Contact
@@ -444,3 +444,10 @@ def _made_again(make: Callable[..., HybridSystem], called: Mapping[str, Any]) ->
     growth = make(**called).growth
     assert isinstance(growth, ContactGrowth), "the call makes a system that grows"
     return growth
+
+
+def contacts_of(system: HybridSystem) -> ContactGrowth | None:
+    """What makes the modes of a system with contacts, or made those that it has; None for other systems."""
+    growth = system.growth
+    made_by = growth.of if isinstance(growth, Finished) else growth
+    return made_by if isinstance(made_by, ContactGrowth) else None

@@ -151,6 +151,16 @@ class Mechanics:
                 found[f"{name}.{what}"] = Output(f"{name}.{what}", (Formula(FREE, scalar(ZERO)),))
         return found
 
+    @property
+    def given(self) -> list[Expression]:
+        """What the author gives: masses, forces, gaps, slips and coefficients."""
+        found = [*(each for row in self.equations.mass for each in row), *self.equations.forces]
+        for each in self.contacts:
+            found += [each.gap, each.restitution, each.friction, each.static]
+            for row in each.rows:
+                found += [*row.weights, row.drift]
+        return found
+
     @cached_property
     def _program(self) -> Program:
         return Program(self.view.listed)
