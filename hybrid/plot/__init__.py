@@ -20,6 +20,7 @@ from hybrid.orbits.sections import Section
 from hybrid.plot.arcs import plot_arc, plot_phase
 from hybrid.plot.basins import plot_basins, plot_fractions
 from hybrid.plot.branches import plot_branch, plot_curve, plot_diagram
+from hybrid.plot.contacts import plot_contacts
 from hybrid.plot.datasets import plot_ends, plot_sweep
 from hybrid.plot.graph import plot_graph
 from hybrid.plot.jumps import plot_global_error, plot_jumps
@@ -38,6 +39,7 @@ __all__ = [
     "plot_arc",
     "plot_basins",
     "plot_branch",
+    "plot_contacts",
     "plot_curve",
     "plot_diagram",
     "plot_ends",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybrid import arguments
+from hybrid.plot.contacts import contact_names, draw_contacts
 from hybrid.plot.style import (
     Rows,
     axes_for,
@@ -42,7 +43,8 @@ def plot_arc(
 ) -> Rows:
     """Draw an arc over time: one row per component or output, one colour per mode, dotted lines for resets.
 
-    The members of a repeat share a row, with one colour per member.
+    The members of a repeat share a row, with one colour per member. Below all components of a system with
+    contacts a last row shows what holds at each, as :func:`plot_contacts` does.
 
     Parameters
     ----------
@@ -77,12 +79,13 @@ def plot_arc(
     """
     system = _as_arc(arc).system
     chosen = list(condensed(system.own_names)) if components is None else _names(system, components)
-    axes = axes_for(ax, len(chosen), figsize=figsize)
+    touches = components is None and bool(contact_names(system))
+    axes = axes_for(ax, len(chosen) + touches, figsize=figsize)
     labels = Names(system.state_names, system.units)
     drawn = [members(name, system) or (name,) for name in chosen]
     columns = [name for names in drawn for name in names]
     lines = curves(arc, columns)
-    for row, name, names in zip(axes, chosen, drawn, strict=True):
+    for row, name, names in zip(axes, chosen, drawn, strict=False):
         shades = member_colours(len(names))
         for k, one in enumerate(names):
             for mode, (t, values) in lines.items():
@@ -98,6 +101,8 @@ def plot_arc(
         row.set_ylabel(labels.label(names[0]).replace(names[0], name))
         row.margins(x=0)
         plain(row)
+    if touches:
+        draw_contacts(arc, axes[-1])
     if len(axes):
         axes[-1].set_xlabel(labels.label("t"))
         legend(axes[0], system.mode_names, lines)

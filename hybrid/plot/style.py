@@ -23,6 +23,9 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 # Entries of a legend in one row.
 MOST_COLUMNS = 5
 
+# Characters in a row of the legend of modes, and those that the line before each name takes.
+ROW, HANDLE = 72, 7
+
 # Largest number of members of a repeat that a legend lists.
 MOST_LISTED = 5
 # Diameter in points of a dot that fills a page.
@@ -156,11 +159,15 @@ def legend(ax: Axes, names: Sequence[str], modes: Iterable[int]) -> None:
     from matplotlib.lines import Line2D
 
     handles = [Line2D([], [], color=colour_of(mode), label=names[mode]) for mode in modes]
+    if not handles:
+        return
+    # Long names take several rows, so that they are no wider than the picture.
+    widest = HANDLE + max(len(str(each.get_label())) for each in handles)
     ax.legend(
         handles=handles,
         loc="lower left",
         bbox_to_anchor=(0, 1),
-        ncols=len(handles),
+        ncols=max(1, min(len(handles), ROW // widest)),
         frameon=False,
         borderaxespad=0.2,
     )

@@ -6,6 +6,12 @@ own tests with ``@given(cases(system))``.
 
 from hybrid.testing.case import Case, Run
 from hybrid.testing.check import check_system
+from hybrid.testing.contacts import (
+    check_coefficients,
+    check_contact_forces,
+    check_gaps,
+    check_impacts,
+)
 from hybrid.testing.crossings import check_crossings
 from hybrid.testing.derivatives import check_derivatives
 from hybrid.testing.dimensions import check_dimensions
@@ -51,7 +57,9 @@ __all__ = [
     "SystemReport",
     "cases",
     "check_angles",
+    "check_coefficients",
     "check_compiled",
+    "check_contact_forces",
     "check_continuity",
     "check_crossings",
     "check_cut",
@@ -61,6 +69,8 @@ __all__ = [
     "check_ends",
     "check_extension",
     "check_flow_direction",
+    "check_gaps",
+    "check_impacts",
     "check_jumps",
     "check_landings",
     "check_laws",

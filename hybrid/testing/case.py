@@ -25,6 +25,7 @@ from hybrid.testing.engine import LIBRARY, Engine
 from hybrid.testing.errors import PropertyError, discard
 from hybrid.testing.reads import is_passed
 from hybrid.testing.sizes import sizes_along
+from hybrid.transform.contacts.growth import contacts_of
 
 TIGHT = DOP853(rtol=1e-12, atol=1e-14, max_steps=20_000)
 # The run is repeated with tolerances looser by this factor, to estimate the error at its end.
@@ -436,7 +437,17 @@ def lies_beyond(case: Case) -> str:
         values = [float(case.evaluate(each, case.t0, case.x0)[0]) for each in law.formulas]
         if not all(value >= 0.0 for value in values):
             told.append(f"invariant {law.name!r}" + (f" of mode {law.of!r}" if law.of else ""))
+    told += [f"the gap of contact {name!r}" for name in negative_gaps(case)]
     return "it lies beyond " + ", ".join(told) if told else "a guard is not finite"
+
+
+def negative_gaps(case: Case) -> list[str]:
+    """The contacts whose gap is negative at the start of a case; none of a system without contacts."""
+    growth = contacts_of(case.system)
+    if growth is None:
+        return []
+    gaps = growth.mechanics.at(case.t0, np.array(case.x0), case.values).gaps
+    return [each.name for each, gap in zip(growth.contacts, gaps, strict=True) if gap < 0.0]
 
 
 def guard_beyond(case: Case, transition: Transition, t: float, x: Any) -> float:

@@ -23,6 +23,16 @@ from hybrid.system.growth import finished, stage_of
 from hybrid.system.labels import named
 from hybrid.system.laws import Elastic, Laws
 from hybrid.testing.case import TIGHT, Case
+from hybrid.testing.contacts import (
+    COEFFICIENTS,
+    FORCES,
+    GAPS,
+    IMPACTS,
+    check_coefficients,
+    check_contact_forces,
+    check_gaps,
+    check_impacts,
+)
 from hybrid.testing.coverage import FIRES, Coverage
 from hybrid.testing.crossings import CROSSINGS, check_crossings
 from hybrid.testing.derivatives import DERIVATIVES, check_derivatives
@@ -80,9 +90,16 @@ from hybrid.testing.ticks import check_ticks
 from hybrid.testing.units import UNITS, check_units
 from hybrid.testing.waits import TICKS
 from hybrid.transform.aged import aged
+from hybrid.transform.contacts.growth import contacts_of
 
 # Properties of the functions, at the start of a case, and of the whole run; laws are others.
-WITHOUT_RUN = (DERIVATIVES, COMPILED, PERIOD, ANGLES, SIDES_AFTER, LIMITS, ENDS)
+OF_CONTACTS = {
+    COEFFICIENTS: check_coefficients,
+    GAPS: check_gaps,
+    FORCES: check_contact_forces,
+    IMPACTS: check_impacts,
+}
+WITHOUT_RUN = (DERIVATIVES, COMPILED, PERIOD, ANGLES, SIDES_AFTER, LIMITS, ENDS, *OF_CONTACTS)
 
 
 def check_system(
@@ -219,7 +236,9 @@ def _properties(
     system: HybridSystem, laws: Laws, flip: Callable[[np.ndarray], np.ndarray] | None
 ) -> dict[str, Callable[[Case], None]]:
     """The properties in the order in which they are checked: what is nearest to the author's text first."""
+    touching = {} if contacts_of(system) is None else OF_CONTACTS
     properties: dict[str, Callable[[Case], None]] = {
+        **touching,
         DERIVATIVES: check_derivatives,
         COMPILED: check_compiled,
         PERIOD: check_period,

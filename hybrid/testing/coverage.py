@@ -265,7 +265,7 @@ def impacts_of(case: Case, arc: HybridArc) -> Iterator[str]:
     growth = contacts_of(case.system)
     known = [] if growth is None else [each.name for each in growth.contacts]
     for jump in arc.jumps:
-        title = case.transition(jump).part_of or ""
+        title = arc.system.transitions[arc.system.transition_index(jump.transition)].part_of or ""
         yield from (name for name in title.split("+") if name in known)
 
 

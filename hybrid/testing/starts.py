@@ -25,6 +25,8 @@ from hybrid.transform.contacts.growth import SETTLING, ContactGrowth, contacts_o
 ON_SURFACE = 1e-14
 NEAR_SURFACE = 1e-9
 MOST_STEPS = 30
+# What is smaller than this share of a state stands for zero.
+DUST = 1e-13
 # Step of the differences.
 NUDGE = 2.0**-26
 
@@ -88,8 +90,12 @@ def start_touching(case: Case, touching: Sequence[int], still: bool) -> Case | N
         rates = [normal] if across is None or not still else [normal, across]
         functions += [scalar(view.gaps[i]), *(scalar(view.speeds[row]) for row in rates)]
     x = nearest_zero(case, functions, case.t0, np.array(case.x0, dtype=float))
-    mode = None if x is None else _mode_told(case, growth, x)
-    if x is None or mode is None:
+    if x is None:
+        return None
+    # What Newton's method leaves of a zero is in the way of differences.
+    x[np.abs(x) < DUST * np.abs(x).max()] = 0.0
+    mode = _mode_told(case, growth, x)
+    if mode is None:
         return None
     state = tuple(float(each) for each in x)
     try:

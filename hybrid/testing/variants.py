@@ -144,8 +144,12 @@ def _altered(system: HybridSystem) -> Altered:
             Transition(mode.name, mode.name + AGAIN, Guard(plane, +1), name=there),
             Transition(mode.name + AGAIN, mode.name, Guard(plane, -1), name=back),
         ]
+    holding = {mode.name for mode in system.modes if mode.holds is not None}
     for transition in system.transitions:
         changed = transition if stay else _freed(transition, unaware, whole, factor, multiples)
+        if transition.reset is None and not holding.isdisjoint({transition.source, transition.target}):
+            # A state that is off what a mode holds by rounding goes on; one that a reset gives has landed.
+            changed = attrs.evolve(changed, reset=None)
         again = attrs.evolve(changed, name=changed.name + AGAIN, source=changed.source + AGAIN)
         if transition.source == transition.target:
             again = attrs.evolve(again, target=again.source)

@@ -195,6 +195,20 @@ class ContactGrowth:
         t, _, parameters = place
         return float(self._kinetic.run(self.mechanics.space.values(t, x, parameters))[0])
 
+    def statuses_in(self, mode: str) -> Statuses:
+        """What holds at each contact in a mode that has been made."""
+        known = (key[0] for key, each in self.made.items() if each.mode.name == mode)
+        return next(known, (OPEN,) * len(self.contacts))
+
+    def mass_at(self, t: float, x: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+        """The mass matrix ``(n, n)``."""
+        values = self._mass.run(self.mechanics.space.values(t, x, parameters))
+        return np.array(values, dtype=float).reshape(self.mechanics.space.size, -1)
+
+    @cached_property
+    def _mass(self) -> Program:
+        return Program([each for row in self.mechanics.equations.mass for each in row])
+
     @cached_property
     def _kinetic(self) -> Program:
         u = [*self.mechanics.space.u]
