@@ -212,6 +212,8 @@ def check_system(
     tally.once(READS, lambda: check_reads(attrs.evolve(system, laws=laws)))
     if system.units:
         tally.once(DIMENSIONS, lambda: check_dimensions(system))
+    if contacts_of(system) is not None and states is not None:
+        tally.once(GAPS, coverage.check_starts)
     aimed = list(coverage.aimed())
     for case in aimed:
         coverage.see(case)
@@ -400,4 +402,5 @@ class _Tally:
             dead_ends=coverage.dead_ends,
             numbers=numbers_read(system),
             discontinuities=jumps,
+            gains=coverage.gains,
         )

@@ -43,7 +43,7 @@ class Touching:
     growth: ContactGrowth
 
     @classmethod
-    def of(cls, case: object) -> Touching:
+    def of(cls, case: Case) -> Touching:
         """The run of a case; the example is discarded if its system has no contacts."""
         growth = contacts_of(as_case(case).system)
         if growth is None:
@@ -279,8 +279,8 @@ def _closed(run: Touching, view: View, jump: Jump) -> list[int]:
 def _momentum(run: Touching, view: View, jump: Jump, closed: list[int]) -> tuple[float, float, float]:
     """The share of the momentum that no contact explains, the energy gained, and the energy before.
 
-    With ``M (u+ - u-) = W f`` the gain without the work of moving surfaces is ``f (v+ + v-) / 2``, where ``v``
-    are the speeds at the contacts. Sizes are those in the metric of the masses.
+    With ``M (u+ - u-) = W f`` the gain without the work of moving surfaces is ``f (v+ + v-) / 2``, where
+    ``v`` are the speeds at the contacts. Sizes are those in the metric of the masses.
     """
     mechanics, t, values = run.growth.mechanics, float(jump.t), run.case.values
     n = mechanics.space.size
@@ -367,8 +367,8 @@ def _coefficient_fault(run: Touching, view: View, k: int, *, impact: bool) -> st
         return f"{title}: friction is {view.friction[k]:.8g}, and must not be negative"
     if not view.static[k] >= view.friction[k]:
         return (
-            f"{title}: static friction is {view.static[k]:.8g}, and must be no smaller than kinetic friction, "
-            f"{view.friction[k]:.8g}"
+            f"{title}: static friction is {view.static[k]:.8g}, and must be no smaller than kinetic "
+            f"friction, {view.friction[k]:.8g}"
         )
     row, across = run.growth.mechanics.places[k]
     if across is not None:

@@ -19,10 +19,11 @@ from hybrid.system.functions import field_function
 from hybrid.system.graph import HybridSystem
 from hybrid.system.watched import is_of_library
 from hybrid.testing.case import MOST_OF_WHOLE, Case, lasting
+from hybrid.testing.contacts import GAPS, gains_on
 from hybrid.testing.errors import PropertyError
 from hybrid.testing.starts import nearest_zero, start_in
-from hybrid.transform.contacts.growth import contacts_of
 from hybrid.testing.symmetry import is_mirrored
+from hybrid.transform.contacts.growth import contacts_of
 
 FIRES = "Every guard can fire, and no condition refuses every crossing"
 # States are also drawn from the ranges times powers of ten between these.
@@ -63,6 +64,8 @@ class Coverage:
         How runs ended before the end of their span, by what is said of it.
     lasting
         Modes in which a run has stayed for some time.
+    gains
+        How often an impact has gained energy as the law of impacts allows, by transition.
     """
 
     system: HybridSystem
@@ -72,6 +75,7 @@ class Coverage:
     ends: Counter[str]
     lasting: set[str] = attrs.field(factory=set)
     cases: list[Case] = attrs.field(factory=list)
+    gains: Counter[str] = attrs.field(factory=Counter)
 
     @classmethod
     def of(cls, system: HybridSystem) -> Coverage:
@@ -95,7 +99,9 @@ class Coverage:
         if arc is None:
             return
         self.jumps.update(jump.transition for jump in arc.jumps if jump.kind != "limit")
-        self.jumps.update(IMPACTS_OF.format(name) for name in impacts_of(case, arc))
+        if contacts_of(self.system) is not None:
+            self.jumps.update(IMPACTS_OF.format(name) for name in impacts_of(case, arc))
+            self.gains.update(gains_on(case))
         self.lasting.update(str(mode) for mode in np.unique(arc.mode[lasting(arc)]))
         self.visits.update([str(arc.mode[0]), *(jump.target for jump in arc.jumps if jump.target)])
         for transition in self.system.transitions:
@@ -106,6 +112,28 @@ class Coverage:
         elif arc.status.code not in AS_MEANT:
             last = f" of {arc.jumps.transition[-1]}" if len(arc.jumps) else ""
             self.ends[f"with {arc.status.code.name}{last}"] += 1
+
+    def check_starts(self) -> None:
+        """Fail if a contact overlaps at some drawn starts, and is open at none.
+
+        Raises
+        ------
+        PropertyError
+            If the ranges of states and the gap of a contact exclude each other.
+        """
+        growth = contacts_of(self.system)
+        assert growth is not None, "this is asked of systems with contacts"
+        at = growth.mechanics.at
+        gaps = np.array([at(case.t0, np.array(case.x0), case.values).gaps for case in self.cases])
+        for contact, values in zip(growth.contacts, gaps.T, strict=True):
+            if np.any(values < 0.0) and not np.any(values > growth.judge.together):
+                self._fail(
+                    f"the gap of contact {contact.name!r} is negative at {int(np.sum(values < 0.0))} of "
+                    f"{len(values)} drawn starts, and positive at none",
+                    f"gap= of contact {contact.name!r} has the wrong sign: it is positive where the bodies "
+                    "are apart; or ranges of states in which they overlap.",
+                    GAPS,
+                )
 
     @property
     def never_seen(self) -> tuple[str, ...]:
@@ -205,7 +233,7 @@ class Coverage:
             told = {1.0: "positive", -1.0: "negative", 0.0: "zero"}[sides.pop()]
             self._fail(
                 f"guard of {name!r} is {told} at all {len(places)} states that were tried, in the ranges and "
-                "far beyond",
+                "far beyond; no run took it",
                 f"a wrong sign, or a wrong threshold, in the guard of {name!r}: it never crosses zero.",
             )
         ways = [way for place in zeros for way in _ways(transition, *place)]
@@ -213,7 +241,7 @@ class Coverage:
             told, other = ("rises", "falls") if guard.direction < 0 else ("falls", "rises")
             self._fail(
                 f"guard of {name!r} {told} at all {len(ways)} places that were tried, in the ranges and far "
-                f"beyond, and fires where it {other}",
+                f"beyond, and fires where it {other}; no run took it",
                 f"the wrong direction of {name!r}, or a wrong sign in its guard.",
             )
         if guard.when is None or self._is_discrete(guard.when):
@@ -222,7 +250,7 @@ class Coverage:
         if len(allowed) >= PLACES and not any(allowed):
             self._fail(
                 f"condition of {name!r} refuses the crossing of its guard at all {len(allowed)} places that "
-                "were tried, in the ranges and far beyond",
+                "were tried, in the ranges and far beyond; no run took it",
                 f"a wrong sign in the condition of {name!r}, or the wrong direction of its guard.",
             )
 
@@ -253,11 +281,9 @@ class Coverage:
                 t *= 10.0 ** rng.uniform(*WIDER) * rng.choice([-1.0, 1.0])
             yield case, case.t0 + t, x
 
-    def _fail(self, line: str, hint: str) -> None:
+    def _fail(self, line: str, hint: str, told: str = FIRES) -> None:
         name = self.system.name or "the system"
-        raise PropertyError(
-            f"{FIRES}: this does not hold for {name}.\n  {line}; no run took it\n  likely: {hint}"
-        )
+        raise PropertyError(f"{told}: this does not hold for {name}.\n  {line}\n  likely: {hint}")
 
 
 def impacts_of(case: Case, arc: HybridArc) -> Iterator[str]:

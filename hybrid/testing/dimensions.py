@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from itertools import combinations
 from math import isclose, isfinite, isinf, nan
@@ -18,8 +18,14 @@ from hybrid.system.functions import CONDITION
 from hybrid.system.graph import HybridSystem, as_system, functions_of
 from hybrid.system.watched import is_of_library
 from hybrid.testing.errors import PropertyError, discard
+from hybrid.transform.contacts.contact import Contact
+from hybrid.transform.contacts.growth import contacts_of
+from hybrid.transform.contacts.statuses import FREE
 
 DIMENSIONS = "The units of every function fit"
+
+# Title of the field of free flight, which masses and forces make.
+FREE_FIELD = f"Mode {FREE!r}: field"
 
 # A message lists at most this many faults, and this many arguments for each value.
 MOST_FAULTS, MOST_NAMES = 5, 8
@@ -235,7 +241,13 @@ def _wanted(system: HybridSystem) -> Iterator[tuple[str, Callable[..., Any], dic
     """Each function of ``(t, x, p)`` with its title, and with the names and the units of its values."""
     time = Quantity(unit_of(system.units["t"]))
     state = {name: Quantity(unit_of(system.units[name])) for name in system.state_names}
+    growth = contacts_of(system)
+    if growth is not None:
+        yield from _of_contacts(system, growth.contacts, time)
     for _, function in functions_of(system):
+        if growth is not None and function.title != FREE_FIELD:
+            # Made from what is checked; what pulls a gap back to zero has the pace of the motion as a number.
+            continue
         if function.kind == "reset" and is_of_library(function.function):
             # The projection onto a surface, whose gradient may have components of several units.
             continue
@@ -246,7 +258,10 @@ def _wanted(system: HybridSystem) -> Iterator[tuple[str, Callable[..., Any], dic
             wanted = {f"the new {name}": unit for name, unit in state.items()}
         title = "condition" if kind == CONDITION else kind
         yield f"{title} of {function.owner[0].lower()}{function.owner[1:]}", function.value, wanted
+    derived = {} if growth is None else growth.mechanics.outputs
     for name, output in system.outputs.items():
+        if name in derived:
+            continue
         wanted = {"the value": Quantity(unit_of(system.units[name]))} if name in system.units else {}
         for formula in output.formulas:
             title = output.title(formula)
@@ -256,21 +271,60 @@ def _wanted(system: HybridSystem) -> Iterator[tuple[str, Callable[..., Any], dic
         yield "period", lambda t, x, p: period(p), {"the value": time}
 
 
+def _of_contacts(
+    system: HybridSystem, contacts: Sequence[Contact], time: Quantity
+) -> Iterator[tuple[str, Callable[..., Any], dict[str, Quantity]]]:
+    """The functions of contacts: a slip has the unit of its gap per time, coefficients are pure numbers."""
+    for each in contacts:
+        title = f"contact {each.name!r}"
+        yield f"gap of {title}", each.gap, {}
+        gap = _first_value(system, each.gap)
+        if each.slip is not None:
+            wanted = {} if gap is None else {"the slip": _product(gap, time, -1)}
+            yield f"slip of {title}", each.slip, wanted
+        for what in ("restitution", "friction", "static"):
+            given = getattr(each, what)
+            if isinstance(given, str):
+                yield f"{what} of {title}", _parameter(given), {"the coefficient": Quantity(unit_of(""))}
+            elif callable(given):
+                yield f"{what} of {title}", given, {"the coefficient": Quantity(unit_of(""))}
+
+
+def _parameter(parameter: str) -> Callable[..., Any]:
+    """The model function that is a parameter."""
+    return lambda t, x, p: getattr(p, parameter)
+
+
+def _first_value(system: HybridSystem, function: Callable[..., Any]) -> Quantity | None:
+    """The unit of a function of one value; None if it cannot be traced."""
+    found = _computed(system, function, UnitAlgebra())
+    return None if not found else found[0]
+
+
 def _faults(
     system: HybridSystem, title: str, function: Callable[..., Any], wanted: dict[str, Quantity]
 ) -> list[str] | None:
     """What does not fit in a function; None if the function cannot be traced."""
-    units, names = system.units, tuple(system.parameters)
-    before = "" if isinstance(system.state, int) else "x."
-    t = Quantity(unit_of(units["t"]), names=("t",))
-    x = [Quantity(unit_of(units[name]), names=(before + name,)) for name in system.state_names]
-    p = [Quantity(unit_of(units.get(name, "")), names=(f"p.{name}",)) for name in names]
     algebra = UnitAlgebra()
-    try:
-        values = values_of(function, system.variables.components, names, algebra, (t, x, p))
-    except Exception:
+    values = _computed(system, function, algebra)
+    if values is None:
         return None
     for value, (what, unit) in zip(values, wanted.items(), strict=False):
         if not value.fits(unit):
             algebra.faults.append(f"{what} is {value.told('in ')}, wanted {unit.told()}")
     return [f"{title}: {fault}" for fault in algebra.faults]
+
+
+def _computed(
+    system: HybridSystem, function: Callable[..., Any], algebra: UnitAlgebra
+) -> list[Quantity] | None:
+    """The values of a function with their units; None if the function cannot be traced."""
+    units, names = system.units, tuple(system.parameters)
+    before = "" if isinstance(system.state, int) else "x."
+    t = Quantity(unit_of(units["t"]), names=("t",))
+    x = [Quantity(unit_of(units[name]), names=(before + name,)) for name in system.state_names]
+    p = [Quantity(unit_of(units.get(name, "")), names=(f"p.{name}",)) for name in names]
+    try:
+        return list(values_of(function, system.variables.components, names, algebra, (t, x, p)))
+    except Exception:
+        return None

@@ -85,6 +85,8 @@ class SystemReport:
         Numbers that the model functions read from modules and closures, by name.
     discontinuities
         Where the field of a mode is discontinuous, by mode: tangent vectors are not valid beyond.
+    gains
+        How often an impact has gained energy as its law allows, by transition.
 
     Examples
     --------
@@ -106,6 +108,7 @@ class SystemReport:
     dead_ends: tuple[str, ...]
     numbers: Mapping[str, float]
     discontinuities: Mapping[str, str]
+    gains: Mapping[str, int] = attrs.field(factory=dict)
 
     @property
     def unchecked(self) -> tuple[str, ...]:
@@ -149,6 +152,12 @@ class SystemReport:
             lines.append(
                 f"- The field of mode {mode!r} jumps where {jumps}: tangent vectors are not valid beyond. "
                 "Make its pieces modes joined by guards there."
+            )
+        if self.gains:
+            told = ", ".join(f"{count} times at {name}" for name, count in self.gains.items())
+            lines.append(
+                f"- IMPACTS GAIN ENERGY, as Newton's law may with friction or several restitutions: {told}. "
+                'mechanics(impacts="poisson") does not.'
             )
         if self.numbers:
             told = ", ".join(f"{name} = {value:.6g}" for name, value in self.numbers.items())

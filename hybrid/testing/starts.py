@@ -71,9 +71,9 @@ def _entry(function: Function, i: int, t: float, x: object, p: object) -> float:
 
 
 def start_touching(case: Case, touching: Sequence[int], still: bool) -> Case | None:
-    """The case with a start near to its own at which some contacts are closed, in the mode told there; or None.
+    """The case with a start near to its own, at which some contacts are closed, in the mode told there.
 
-    Its system has the modes that its run needs.
+    None if there is none. Its system has the modes that its run needs.
 
     Parameters
     ----------
@@ -84,7 +84,8 @@ def start_touching(case: Case, touching: Sequence[int], still: bool) -> Case | N
     """
     growth = contacts_of(case.system)
     assert growth is not None, "this is asked of systems with contacts"
-    view, functions = growth.mechanics.view, []
+    view = growth.mechanics.view
+    functions: list[Function] = []
     for i in touching:
         normal, across = growth.mechanics.places[i]
         rates = [normal] if across is None or not still else [normal, across]
@@ -108,7 +109,7 @@ def start_touching(case: Case, touching: Sequence[int], still: bool) -> Case | N
 
 
 def _mode_told(case: Case, growth: ContactGrowth, x: np.ndarray) -> str | None:
-    """The mode that a state tells; None if a gap is negative there, or nothing or several things may happen."""
+    """The mode that a state tells; None if a gap is negative there, or none or several modes are possible."""
     try:
         mode = growth.mode_at(case.t0, x, case.values, None)
     except ArgumentError:

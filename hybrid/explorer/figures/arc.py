@@ -35,7 +35,7 @@ class ArcFigures:
     """
 
     def __init__(self, system: HybridSystem, states: States) -> None:
-        self.system, self.states = system, states
+        self.states = states
         self.labels = Names(system.state_names, system.units)
         self.curves: dict[int, Any] = {}
         self.held, self.start, self.orbit, self.at = (states.source() for _ in range(4))
@@ -92,7 +92,10 @@ class ArcFigures:
 
     def show(self, arc: HybridArc, start: Any) -> None:
         """Draw an arc, and the start, a row of what is shown."""
-        drawn = curves(arc, self.states.shown)
+        names = arc.system.mode_names
+        drawn = {
+            self.states.place_of(names[mode]): lines for mode, lines in curves(arc, self.states.shown).items()
+        }
         self.begin = float(arc.t[0]) if len(arc.t) else 0.0
         self.length = float(arc.t[-1]) - self.begin if len(arc.t) else 0.0
         for mode in {*self.curves, *drawn}:
@@ -115,8 +118,9 @@ class ArcFigures:
             made = self.curves[mode] = self.states.source()
             options = {"source": made, "color": colour_of(mode), "line_width": 1.6}
             across, up = self.in_plane[0].glyph.x, self.in_plane[0].glyph.y
-            several = len(self.system.mode_names) > 1
-            legend = {"legend_label": self.system.mode_names[mode]} if several else {}
+            names = list(self.states.modes)
+            several = len(names) > 1
+            legend = {"legend_label": names[mode]} if several else {}
             self.in_plane.append(self.portrait.line(across, up, **options, **legend))
             self.over_time.append(self.series.line("t", self.over_time[0].glyph.y, **options))
             if several:

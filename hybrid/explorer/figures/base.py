@@ -113,6 +113,11 @@ class States:
         self.names = system.quantity_names
         self.columns = [f"x{i}" for i in range(len(self.names))]
         self.own = self.shown = system.state_names
+        self.modes = {name: i for i, name in enumerate(system.mode_names)}
+
+    def place_of(self, mode: str) -> int:
+        """The place of a mode among those seen, which tells its colour: a system may grow further ones."""
+        return self.modes.setdefault(mode, len(self.modes))
 
     def choose(self, *chosen: str) -> bool:
         """Show these names, and all components; whether there is an output among them that is new."""

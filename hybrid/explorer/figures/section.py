@@ -9,7 +9,7 @@ from bokeh.models import LinearColorMapper
 
 from hybrid.explorer.figures.base import HELD, ORBIT, START, Axes, States, blank, empty, extent_of, source
 from hybrid.plot.basins import NONE_COLOUR, VIOLATES_COLOUR
-from hybrid.plot.style import COLOURS, colour_of
+from hybrid.plot.style import COLOURS
 from hybrid.simulation.labelled import Names
 from hybrid.system.graph import HybridSystem
 
@@ -27,7 +27,7 @@ class SectionFigure:
     """
 
     def __init__(self, system: HybridSystem, states: States) -> None:
-        self.system, self.states = system, states
+        self.states = states
         self.labels = Names(system.state_names, system.units)
         self.points = states.source("mode")
         self.held, self.start, self.orbit = (states.source() for _ in range(3))
@@ -40,8 +40,7 @@ class SectionFigure:
             color_mapper=LinearColorMapper(palette=palette, low=-1.5, high=len(COLOURS) + 0.5),
             alpha=0.45,
         )  # fmt: skip
-        count = len(system.mode_names) + 1
-        colours = LinearColorMapper(palette=[colour_of(i) for i in range(count)], low=-0.5, high=count - 0.5)
+        colours = LinearColorMapper(palette=list(COLOURS), low=-0.5, high=len(COLOURS) - 0.5)
         first, second = states.columns[0], states.columns[-1]
         held = self.made.scatter(first, second, source=self.held, size=2, marker="square", color=HELD)
         drawn = self.made.scatter(
@@ -85,7 +84,7 @@ class SectionFigure:
         The axes show at least a share of the ``extent (shown,)`` of the arc.
         """
         names, place = np.unique(mode, return_inverse=True)
-        numbers = np.array([self.system.mode_index(str(name)) for name in names], dtype=float)
+        numbers = np.array([self.states.place_of(str(name)) % len(COLOURS) for name in names], dtype=float)
         column = numbers[place] if len(mode) else np.empty(0)
         self.points.data = {**self.states.rows(table), "mode": column}
         self.start.data = self.states.rows(start)
