@@ -38,6 +38,7 @@ HERE = Path(__file__).parent
 README = HERE.parent / "README.md"
 PLAIN = HERE / "plain-equations.md"
 OUTPUTS = HERE / "outputs.md"
+CONTACTS = HERE / "contacts-from-gaps.md"
 STYLE = {"font.size": 9, "axes.titlesize": 10, "axes.titlelocation": "left", "savefig.dpi": 160}
 
 
@@ -110,6 +111,13 @@ def outputs_picture(system: HybridSystem, folder: Path) -> None:
     """Height, force and energy of the soft contact."""
     axes = plot_arc(simulate(system, (0.2, 0.0), (0.0, 1.0)), ["q", "force", "energy"], figsize=(6.4, 4.2))
     save(axes.figure, folder / "outputs.png")
+
+
+def contacts_picture(system: HybridSystem, folder: Path) -> None:
+    """A block that bounces, slides and sticks, over time."""
+    arc = simulate(system, {"x": 0.0, "y": 1.0, "u": 3.0, "v": 0.0}, (0.0, 4.0))
+    axes = plot_arc(arc, figsize=(6.4, 5.6))
+    save(axes.figure, folder / "contacts_over_time.png")
 
 
 def chart_picture(system: HybridSystem, folder: Path) -> None:
@@ -191,6 +199,7 @@ def main() -> None:
         graph_picture(system, folder)
         split_picture(model_of(PLAIN, "oscillator"), folder)
         outputs_picture(model_of(OUTPUTS, "ball"), folder)
+        contacts_picture(model_of(CONTACTS, "block"), folder)
         chart_picture(system, folder)
         branch_picture(folder)
         equilibria_picture(folder)

@@ -141,6 +141,7 @@ DEFAULTS = {
     hybrid.plot.plot_basins: {"size": None, **FIGURE},
     hybrid.plot.plot_fractions: FIGURE,
     hybrid.plot.plot_arc: {"components": None, **FIGURE},
+    hybrid.plot.plot_contacts: FIGURE,
     hybrid.plot.plot_ends: {"x": 0, "y": None, "size": None, **FIGURE},
     hybrid.plot.plot_global_error: FIGURE,
     hybrid.plot.plot_graph: FIGURE,

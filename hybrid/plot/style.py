@@ -162,12 +162,13 @@ def legend(ax: Axes, names: Sequence[str], modes: Iterable[int]) -> None:
     if not handles:
         return
     # Long names take several rows, so that they are no wider than the picture.
-    widest = HANDLE + max(len(str(each.get_label())) for each in handles)
+    widths = [HANDLE + len(str(each.get_label())) for each in handles]
+    columns = len(handles) if sum(widths) <= ROW else max(1, ROW // max(widths))
     ax.legend(
         handles=handles,
         loc="lower left",
         bbox_to_anchor=(0, 1),
-        ncols=max(1, min(len(handles), ROW // widest)),
+        ncols=columns,
         frameon=False,
         borderaxespad=0.2,
     )

@@ -232,7 +232,7 @@ def check_impacts(case: Case) -> None:
     for jump in run.impacts():
         seen = True
         view = run.view(jump.t, jump.x_minus)
-        closed = _closed(run, view, jump)
+        closed = _closed(run, view, jump.t, jump.x_minus)
         off, gain, energy = _momentum(run, view, jump, closed)
         if off > TOLERANCE:
             case.fail(
@@ -260,20 +260,16 @@ def gains_on(case: Case) -> Iterator[str]:
     run = Touching.of(case)
     for jump in run.impacts():
         view = run.view(jump.t, jump.x_minus)
-        closed = _closed(run, view, jump)
+        closed = _closed(run, view, jump.t, jump.x_minus)
         _, gain, energy = _momentum(run, view, jump, closed)
         if gain > TOLERANCE * energy and _may_gain(run, view, closed):
             yield str(jump.transition)
 
 
-def _closed(run: Touching, view: View, jump: Jump) -> list[int]:
-    """The contacts that are closed at an impact."""
-    return [
-        k
-        for k, gap in enumerate(view.gaps)
-        if abs(gap)
-        <= run.growth.judge.together + CLOSED * run.size_of_gap(k, float(jump.t), np.asarray(jump.x_minus))
-    ]
+def _closed(run: Touching, view: View, t: float, x: np.ndarray) -> list[int]:
+    """The contacts that are closed at a point."""
+    together = run.growth.judge.together
+    return [k for k, gap in enumerate(view.gaps) if abs(gap) <= together + CLOSED * run.size_of_gap(k, t, x)]
 
 
 def _momentum(run: Touching, view: View, jump: Jump, closed: list[int]) -> tuple[float, float, float]:
@@ -336,8 +332,14 @@ def check_coefficients(case: Case) -> None:
     found: list[tuple[float, str, str | None]] = []
     for jump in run.impacts():
         view = run.view(jump.t, jump.x_minus)
-        for k in _closed(run, view, jump):
+        for k in _closed(run, view, jump.t, jump.x_minus):
             found.append((jump.t, jump_told(case, jump), _coefficient_fault(run, view, k, impact=True)))
+    arc, last = run.arc, len(run.arc.t) - 1
+    view = run.view(arc.t[last], arc.x[last])
+    for k in _closed(run, view, arc.t[last], arc.x[last]):
+        # An impact at which nothing is possible ends the run.
+        fault = _coefficient_fault(run, view, k, impact=not arc.status.ok)
+        found.append((float(arc.t[last]), run.place_told(last), fault))
     for i, view in run.rows():
         for k, status in enumerate(run.growth.statuses_in(str(run.arc.mode[i]))):
             if status != OPEN:

@@ -14,7 +14,7 @@ from hybrid.expression.values import TraceError
 from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Reset, Transition
 from hybrid.system.functions import WholeReset, field_function
-from hybrid.system.graph import HybridSystem, as_system, functions_of, laws_of, watched_by
+from hybrid.system.graph import HybridSystem, as_system, functions_of, laws_of, watched_below, watched_by
 from hybrid.testing.errors import PropertyError, discard
 from hybrid.transform.contacts.growth import contacts_of
 
@@ -112,8 +112,8 @@ def check_reads(system: HybridSystem) -> None:
 
 def numbers_read(system: HybridSystem) -> dict[str, float]:
     """The plain numbers that the functions read from modules and closures, by name."""
-    below = () if contacts_of(system) is None else (system.derived_from,)
-    return watched_by(system).joined(*below).numbers()
+    watched = watched_by if contacts_of(system) is None else watched_below
+    return watched(system).numbers()
 
 
 def _all_functions(system: HybridSystem) -> list[Callable[..., Any]]:

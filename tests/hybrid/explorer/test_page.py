@@ -17,6 +17,7 @@ from hybrid.explorer.pictures import diagram_call
 from hybrid.explorer.subject import subject
 from hybrid.explorer.worker import Job, Outcome
 from hybrid.status import StatusCode
+from tests.hybrid.transform.contacts.scenes import block
 
 IMPORTS = "import hybrid\nimport lyapunov\nimport matplotlib.pyplot as plt\nimport numpy as np\n\n"
 
@@ -159,6 +160,26 @@ def test_jumps_are_stepped_through(opened):
     assert "Jump 2 of" in page.widgets.event.object
     page.step(-5)
     assert "Jump 1 of" in page.widgets.event.object
+
+
+def test_a_system_whose_modes_are_made_later_is_played_with(opened):
+    """The modes of contacts are not those that the system had when the page was opened."""
+    page = opened(block, query={"columns": "4"}, x0=(0.0, 1.0, 2.0, 0.0))
+    arc = page.board.live.arc
+    assert {"free", "floor sticks"} <= set(map(str, arc.mode))
+    drawn = {
+        name
+        for name, place in page.board.figures.states.modes.items()
+        if place in page.board.figures.arc.curves
+    }
+    assert set(map(str, arc.mode)) <= drawn
+    page.step(1)
+    assert "floor" in page.widgets.event.object
+    for _ in range(3):
+        page.tick()
+    page.move("mu", 0.4)
+    assert page.worker.wait(60)
+    assert page.board.live.arc.status.ok
 
 
 def test_the_point_runs_along_the_arc(opened):
