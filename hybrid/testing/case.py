@@ -428,8 +428,8 @@ def _before_trouble(arc: HybridArc) -> tuple[float, str]:
 
 def lies_beyond(case: Case) -> str:
     """In words: the guards that forbid the start of a case."""
-    told = []
-    for transition in case.system.transitions:
+    told = [f"the gap of contact {name!r}" for name in negative_gaps(case)]
+    for transition in () if told else case.system.transitions:
         value = guard_beyond(case, transition, case.t0, case.x0)
         if not value < 0.0:
             told.append(f"guard {transition.name!r} of mode {transition.source!r}")
@@ -437,7 +437,6 @@ def lies_beyond(case: Case) -> str:
         values = [float(case.evaluate(each, case.t0, case.x0)[0]) for each in law.formulas]
         if not all(value >= 0.0 for value in values):
             told.append(f"invariant {law.name!r}" + (f" of mode {law.of!r}" if law.of else ""))
-    told += [f"the gap of contact {name!r}" for name in negative_gaps(case)]
     return "it lies beyond " + ", ".join(told) if told else "a guard is not finite"
 
 

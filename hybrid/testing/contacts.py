@@ -255,6 +255,20 @@ def check_impacts(case: Case) -> None:
         discard("no impact on the run")
 
 
+def discard_onset_of_slip(case: Case) -> None:
+    """Discard the example if a contact that stuck begins to slip on its run.
+
+    The mode that held the slip leaves it at zero but for rounding, whose sign the next mode sees: in a system
+    that is written differently it is another one.
+    """
+    growth = contacts_of(case.system)
+    if growth is None:
+        return
+    titles = {f"{each.name} slips" for each in growth.contacts}
+    if any(case.transition(jump).part_of in titles for jump in case.run.arc.jumps):
+        discard("a contact that stuck begins to slip, where its slip is zero but for rounding")
+
+
 def gains_on(case: Case) -> Iterator[str]:
     """The impacts of a run that gain energy as the law of impacts allows, by the name of the transition."""
     run = Touching.of(case)

@@ -14,6 +14,7 @@ from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.jumps import Jump
 from hybrid.system.graph import HybridSystem
 from hybrid.testing.case import Case, Run, as_case, matrix_told, mode_after
+from hybrid.testing.contacts import discard_onset_of_slip
 from hybrid.testing.errors import discard
 from hybrid.testing.events import BEYOND
 from hybrid.testing.variants import AGAIN, altered, new_name, renamed, reordered
@@ -50,6 +51,7 @@ def check_cut(case: Case) -> None:
     >>> check_cut(case)
     """
     as_case(case)
+    discard_onset_of_slip(case)
     settles = None if contacts_of(case.system) is None else SETTLING
     if any(case.is_passed(each) for each in case.system.transitions if each.source != settles):
         discard("a transition that the state passes would fire again in the copy of its mode")
@@ -175,6 +177,7 @@ def check_scale(case: Case) -> None:
     >>> check_scale(case)
     """
     as_case(case)
+    discard_onset_of_slip(case)
     variant = altered(case.system)
     if variant.resets_stay:
         discard("a model function cannot be traced, so it cannot be changed")
