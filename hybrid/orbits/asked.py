@@ -68,7 +68,11 @@ class Asked:
     def _from(
         self, orbit: PeriodicOrbit, x: np.ndarray, mode: str, jumps: Sequence[Fired], *, first: bool
     ) -> PeriodicOrbit:
-        """The orbit from a state; the jumps there come ``first``, or last."""
+        """The orbit from a state; the jumps there come ``first``, or last.
+
+        Cyclic components have the values of the guess there.
+        """
+        x = np.where(orbit.system.is_cyclic[: len(x)], self.point.x, x)
         early = [jump for jump in jumps if jump.t > self.t and not self.is_at(jump.t)]
         here = [jump for jump in jumps if self.is_at(jump.t)]
         late = [jump for jump in jumps if jump.t < self.t and not self.is_at(jump.t)]

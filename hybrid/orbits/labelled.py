@@ -40,6 +40,9 @@ def labelled_orbit(orbit: Any) -> xarray.Dataset:
         names.coords(),
         {**made_by, "signature": list(orbit.signature), "transitions": list(orbit.transitions)},
     )
+    if orbit.shift:
+        shift = [orbit.shift.get(name, 0.0) for name in orbit.system.state_names]
+        found = found.assign(shift=("state", shift, names.states))
     [row] = table_at(orbit.system, [*orbit.system.outputs], [orbit])
     return with_outputs(found, orbit.system, {"outputs": ((), row)})
 
@@ -68,8 +71,9 @@ def described_orbit(orbit: Any) -> str:
     through = f" through {', '.join(map(repr, orbit.transitions))}" if orbit.transitions else ""
     largest = orbit.multipliers[0]
     pair = f" +- {abs(largest.imag):.6g}i" if largest.imag else ""
+    along = "".join(f", shift of {name} {value:.6g}" for name, value in orbit.shift.items())
     return (
-        f"<PeriodicOrbit period {orbit.period:.9g} from {orbit.mode!r}{through}, largest multiplier "
+        f"<PeriodicOrbit period {orbit.period:.9g}{along} from {orbit.mode!r}{through}, largest multiplier "
         f"{largest.real:.6g}{pair}, residual {orbit.residual:.1e}, {orbit.status.brief}>"
     )
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from hybrid.orbits.rest import EPSILON, Drift
 from hybrid.status import Status, StatusCode
-from hybrid.system.periodicity import closed_change
+from hybrid.system.graph import HybridSystem
 
 # Rounding of the end of an orbit, in units in the last place of its largest states: the largest gap accepted
 # when Newton's method makes no more progress.
@@ -60,10 +60,11 @@ class Departure:
 class Shot:
     """What one integration over the period gives.
 
-    ``extent (n,)`` is how far each component moves, ``magnitude (n,)`` its largest absolute value. ``drift``
+    ``extent (n,)`` is how far each component moves, ``magnitude (n,)`` its largest absolute value; a cyclic
+    component has the extent 0, since its motion tells nothing of an orbit. ``drift``
     knows how far components at rest are carried. ``beyond`` names the transitions whose guards the start lies
     beyond. ``departure`` is how far the start is from the values of conserved quantities that are held.
-    ``lengths (n,)`` are those of a turn of angles, 0 for other components. ``at_steps`` is the largest
+    ``at_steps`` is the largest
     absolute value at the ends of steps, which the solver's tolerances control. ``more_waits`` tells whether
     more delays are under way at the end than at the start, or fewer.
     """
@@ -78,30 +79,37 @@ class Shot:
     extent: np.ndarray
     magnitude: np.ndarray
     status: Status
+    system: HybridSystem
     drift: Drift | None = None
     beyond: tuple[str, ...] = ()
     departure: Departure | None = None
-    lengths: np.ndarray | None = None
     at_steps: float = np.inf
     more_waits: bool = False
 
     @property
     def gap(self) -> np.ndarray:
-        """Distance ``(n,)`` from the start to the end, without whole turns of angles."""
-        gap = self.end - self.point.x
-        if self.lengths is not None:
-            gap = closed_change(gap, self.lengths)
+        """Distance ``(n,)`` from the start to the end, without whole turns of angles and without shifts."""
+        gap = self.system.unclosed(self.end - self.point.x)
         if self.drift is not None:
             gap[self.drift.components] = self.drift.moved
         return gap
 
     @property
     def slopes(self) -> np.ndarray:
-        """Derivatives ``(n, n)`` of the gap in the start."""
-        slopes = self.fundamental - np.eye(len(self.end))
+        """Derivatives ``(n, n)`` of the gap in the start.
+
+        A cyclic component has no gap. In the place of its row is that of its start, which stays as it is.
+        """
+        identity = np.eye(len(self.end))
+        slopes = np.where(self.cyclic[:, None], identity, self.fundamental - identity)
         if self.drift is not None:
             slopes[self.drift.components] = self.drift.slopes
         return slopes
+
+    @property
+    def cyclic(self) -> np.ndarray:
+        """Whether each component ``(n,)`` is cyclic."""
+        return np.asarray(self.system.is_cyclic[: len(self.end)])
 
     @property
     def reached(self) -> bool:
@@ -167,7 +175,7 @@ class Newton:
         """From the first shot; sizes below the solver's absolute tolerance count as that."""
         scale = np.maximum(shot.magnitude, max(atol, np.finfo(float).tiny))
         with np.errstate(over="ignore"):  # a field of 1e300 beside a component of 1e-14
-            plane = shot.field / scale
+            plane = np.where(shot.cyclic, 0.0, shot.field / scale)
         return cls(scale, scale, np.zeros_like(scale), free_period, shot.point.x, plane)
 
     def advanced(self, shot: Shot, better: Shot) -> Newton:
@@ -251,7 +259,7 @@ class Newton:
         units = self.measure(shot)
         matrix = shot.slopes / units[:, None] * self.scale
         if self.free_period:
-            speed = shot.end_field / units * shot.point.period
+            speed = np.where(shot.cyclic, 0.0, shot.end_field / units * shot.point.period)
             matrix = np.block([[matrix, speed[:, None]], [self._across()[None, :], np.zeros((1, 1))]])
         if shot.departure is None:
             return matrix

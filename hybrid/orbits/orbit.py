@@ -55,9 +55,10 @@ class PeriodicOrbit:
     period
         Time until the orbit closes: for a forced system ``periods`` forcing periods.
     multipliers
-        Floquet multipliers ``(n,)``, largest first; an autonomous orbit has one that is 1. Each has its own
-        relative accuracy, however small: they come from the factors of the fundamental matrix along the
-        orbit.
+        Floquet multipliers ``(n,)``, largest first; an autonomous orbit has one that is 1, and there is one
+        more that is 1 for each cyclic component, along which orbits lie side by side. These say nothing of
+        the stability. Each has its own relative accuracy, however small: they come from the factors of the
+        fundamental matrix along the orbit.
     log_moduli
         Natural logarithms of the moduli of the multipliers ``(n,)``, also of those out of the range of
         floating-point numbers; minus infinity for a multiplier of zero.
@@ -78,6 +79,8 @@ class PeriodicOrbit:
         derivative depends on the order of two events.
     turns
         Whole turns of each angle of the system over the period, by name.
+    shift
+        By how much each cyclic component of the system is larger after the period, by name.
 
     Examples
     --------
@@ -105,6 +108,7 @@ class PeriodicOrbit:
     transitions: tuple[str, ...]
     status: Status
     turns: Mapping[str, int] = attrs.field(factory=dict)
+    shift: Mapping[str, float] = attrs.field(factory=dict)
 
     def __repr__(self) -> str:
         return described_orbit(self)
@@ -236,3 +240,9 @@ def turns_over(system: HybridSystem, change: np.ndarray) -> dict[str, int]:
     lengths = system.turn_lengths[: len(change)]
     turns = dict(zip(system.state_names, whole_turns(change, lengths).tolist(), strict=False))
     return {name: int(turns[name]) for name in system.angles}
+
+
+def shift_over(system: HybridSystem, change: np.ndarray) -> dict[str, float]:
+    """Change of each cyclic component in a change of the state, which leaves out the counters, by name."""
+    changes = dict(zip(system.state_names, change.tolist(), strict=False))
+    return {name: float(changes[name]) for name in system.cyclic}

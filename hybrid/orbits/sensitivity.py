@@ -25,7 +25,7 @@ class OrbitSensitivity:
         Names of the parameters.
     x0
         Of the orbit's point, ``(n, m)``: of a forced system at the time ``t0``; of an autonomous one in the
-        plane through the point across the field.
+        plane through the point across the field. Cyclic components are held, so theirs are 0.
     period
         Of the period, ``(m,)``.
     multipliers
@@ -78,13 +78,15 @@ def _of_point(orbit: Pass, slopes: np.ndarray, t: float) -> np.ndarray:
         orbit.family.route[i], loop.x[i], float(begin), float(begin + share * (end - begin)), loop.values
     )
     start = slopes[i * n : (i + 1) * n] - np.outer(flow.first_rate, slopes[loop.x.size + i])
-    found = flow.slopes[:, :n] @ start + flow.slopes[:, n:]
+    cyclic = orbit.family.system.is_cyclic[:n]
+    found = np.where(cyclic[:, None], 0.0, flow.slopes[:, :n] @ start + flow.slopes[:, n:])
     if orbit.family.forced:
         # The stretch passes the point some periods after the time, which stays.
         later = round((begin + share * (end - begin) - t) / loop.period)
         longer = slopes[-1] - slopes[loop.x.size]
-        return np.asarray(found + later * np.outer(flow.last_rate, longer))
-    across, along = flow.last_rate / orbit.scale**2, flow.last_rate
+        return np.asarray(found + later * np.outer(np.where(cyclic, 0.0, flow.last_rate), longer))
+    along = np.where(cyclic, 0.0, flow.last_rate)
+    across = along / orbit.scale**2
     return np.asarray(found - np.outer(along, across @ found) / (across @ along))
 
 

@@ -15,7 +15,7 @@ from hybrid.orbits.continuation.route import accumulating
 from hybrid.orbits.held import Held, held_by
 from hybrid.orbits.lap import Fired, Lap, lap_of
 from hybrid.orbits.newton import ROUNDING_OF_GAP, Newton, Point, Shot, length
-from hybrid.orbits.orbit import PeriodicOrbit, closes, turns_over
+from hybrid.orbits.orbit import PeriodicOrbit, closes, shift_over, turns_over
 from hybrid.orbits.rest import EPSILON, drift
 from hybrid.orbits.waits import waits_change
 from hybrid.simulation.arc import HybridArc
@@ -26,7 +26,6 @@ from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode, noting
 from hybrid.system.entries import are_ageless
 from hybrid.system.graph import HybridSystem
-from hybrid.system.periodicity import closed_change
 
 # Points, besides the solver's own, that show how far an orbit moves.
 SAMPLES = 65
@@ -107,7 +106,9 @@ class Shooting:
         arc = self.follow(point, point.period, mode)
         states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], SAMPLES))])[:, :n]
         extent, magnitude = np.ptp(states, axis=0), np.abs(states).max(axis=0)
-        at_rest, carried = extent <= ROUNDING_OF_GAP * EPSILON * magnitude, None
+        cyclic, carried = self.system.is_cyclic[:n], None
+        extent[cyclic] = 0.0
+        at_rest = ~cyclic & (extent <= ROUNDING_OF_GAP * EPSILON * magnitude)
         if np.any(at_rest) and code == StatusCode.SUCCESS and len(arc.jumps) <= MOST_JUMPS_LOOKED_AT:
             again, end = self._trajectory(point, self.mode), point.t + point.period
             carried = drift(again, end, arc.jumps.t, at_rest, magnitude)
@@ -122,10 +123,10 @@ class Shooting:
             extent,
             magnitude,
             status_of(trajectory, code),
+            self.system,
             carried,
             trajectory.beyond,
             None if self.held is None else self.held.departure(point.t, point.x, magnitude),
-            self.system.turn_lengths[:n],
             float(np.abs(arc.x).max()),
             more_waits=waits_change(self.system, arc),
         )
@@ -291,16 +292,20 @@ class Shooting:
         if not arc.status.ok:
             return guess.period
         n = self.system.tangent_dimension
-        extent, lengths = np.ptp(arc.x[:, :n], axis=0), self.system.turn_lengths[:n]
-        apart = [closed_change(each, lengths) for each in arc(guess.t + times)[:, :n] - guess.x]
+        extent = np.ptp(arc.x[:, :n], axis=0)
+        apart = [self.system.unclosed(each) for each in arc(guess.t + times)[:, :n] - guess.x]
         gaps = [length(each) for each in apart / np.where(extent > 0, extent, 1.0)]
         nearest = int(np.argmin(gaps))
         return float(times[nearest]) if gaps[nearest] < NEARER * gaps[SAMPLES - 1] else guess.period
 
     def _nearest(self, orbit: PeriodicOrbit, guess: Point) -> PeriodicOrbit:
-        """The same orbit from the point of its arc, away from jumps, that is nearest to the guess."""
-        arc = orbit.arc(self.solver)
-        states = arc.x[:, : self.system.tangent_dimension]
+        """The same orbit from the point of its arc, away from jumps, that is nearest to the guess.
+
+        Cyclic components have the values of the guess there.
+        """
+        arc, n = orbit.arc(self.solver), self.system.tangent_dimension
+        cyclic = self.system.is_cyclic[:n]
+        states = np.where(cyclic, guess.x, arc.x[:, :n])
         extent = np.ptp(states, axis=0)
         # Distances in units of the orbit, so that those of the states do not matter.
         apart = (states - guess.x) / np.where(extent > 0, extent, 1.0)
@@ -309,7 +314,8 @@ class Shooting:
         away = np.array([np.all(np.abs(times - t) > POINT_ERROR * orbit.period) for t in arc.t])
         away &= are_ageless(self.system, arc.mode)
         i = int(np.argmin(np.where(away, np.linalg.norm(apart, axis=1), np.inf)))
-        return attrs.evolve(orbit, x0=arc.x[i], mode=str(arc.mode[i]), t0=float(arc.t[i]))
+        x0 = np.append(states[i], arc.x[i, n:])
+        return attrs.evolve(orbit, x0=x0, mode=str(arc.mode[i]), t0=float(arc.t[i]))
 
     def _result(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> PeriodicOrbit:
         lap, jumps = self._lap(shot)
@@ -343,6 +349,7 @@ class Shooting:
             transitions=tuple(jump.transition for jump in jumps),
             status=shot.status,
             turns=turns_over(self.system, shot.end - shot.point.x),
+            shift=shift_over(self.system, shot.end - shot.point.x),
         )
         if self.asked is None or lap.orbit is None:
             return orbit
@@ -415,7 +422,7 @@ class Shooting:
 
         A small singular value alone may come from an instability, and a multiplier near 1 from a fold.
         """
-        ones = int(np.sum(np.abs(multipliers - 1.0) <= NEAR_ONE))
+        ones = int(np.sum(np.abs(multipliers - 1.0) <= NEAR_ONE)) - int(np.sum(shot.cyclic))
         if ones <= newton.free_period or not newton.nearly_singular(shot, NEARLY_SINGULAR):
             return False
         change, longer = newton.step(shot, NEARLY_SINGULAR)

@@ -13,7 +13,7 @@ from hybrid import arguments
 from hybrid.errors import ModelError
 from hybrid.system.derivatives import check_derivative, evaluate, sample_points
 from hybrid.system.functions import CONDITION, ModelFunction, WholeReset
-from hybrid.system.periodicity import Period, angle_fault_at, period_at, period_fault
+from hybrid.system.periodicity import Period, angle_fault_at, cyclic_fault_at, period_at, period_fault
 from hybrid.system.rows import fires, plain_firing
 from hybrid.system.variables import Variables
 from hybrid.system.watched import is_of_library
@@ -56,10 +56,29 @@ def check_angles(variables: Variables, functions: Sequence[ModelFunction], lengt
     ModelError
         If one differs.
     """
-    own = [each for each in functions if not is_of_library(each.function)] if np.any(lengths) else []
-    for function in own:
+    for function in authored(functions) if np.any(lengths) else ():
         for t, x in sample_points(variables.dimension):
             fault = angle_fault_at(variables, function, t, x, variables.defaults, lengths)
+            if fault is not None:
+                raise ModelError(fault)
+
+
+def authored(functions: Sequence[ModelFunction]) -> list[ModelFunction]:
+    """The functions that an author wrote, without those that the library derives."""
+    return [each for each in functions if not is_of_library(each.function)]
+
+
+def check_cyclic(variables: Variables, functions: Sequence[ModelFunction], cyclic: np.ndarray) -> None:
+    """Compare functions with themselves after a shift along each component that is ``cyclic (n,)``.
+
+    Raises
+    ------
+    ModelError
+        If one differs, or a reset does not shift with the component.
+    """
+    for function in functions if np.any(cyclic) else ():
+        for t, x in sample_points(variables.dimension):
+            fault = cyclic_fault_at(variables, function, t, x, variables.defaults, cyclic)
             if fault is not None:
                 raise ModelError(fault)
 

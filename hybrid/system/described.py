@@ -60,6 +60,8 @@ def _heading(system: Any) -> list[str]:
     if system.angles:
         turns = {shared_name(name): f"turns in {turn:.6g}" for name, turn in system.angles.items()}
         lines.append(f"angles: {', '.join(f'{name} {turn}' for name, turn in turns.items())}")
+    if system.cyclic:
+        lines.append(f"cyclic: {', '.join(condensed(system.cyclic))}")
     if system.period is not None:
         lines.append(f"period: {_period_told(system)}")
     if system.switching:

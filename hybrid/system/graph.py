@@ -12,7 +12,7 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.errors import ModelError, unknown_name
-from hybrid.system.checks import check_angles, check_functions
+from hybrid.system.checks import authored, check_angles, check_cyclic, check_functions
 from hybrid.system.delayed import check_under_way, has_delays, written_out
 from hybrid.system.described import described, described_in_html
 from hybrid.system.elements import END, Mode, Transition
@@ -36,7 +36,7 @@ from hybrid.system.laws import Laws, placed
 from hybrid.system.members import shared_name
 from hybrid.system.moving import moving_numbers
 from hybrid.system.outputs import Output, as_outputs, check_outputs
-from hybrid.system.periodicity import Period, period_at
+from hybrid.system.periodicity import Period, closed_change, period_at
 from hybrid.system.portable import Portable
 from hybrid.system.repeat import Repeat
 from hybrid.system.switching import switching_inside
@@ -94,6 +94,11 @@ class HybridSystem(Portable):
         Components that are angles, with the length of a turn: ``{"phi": 2 * np.pi}``. A turn further the
         functions must be the same, which is checked; a reset may add whole turns. Orbits close, and
         attractors are near, up to whole turns. The state itself is never wrapped.
+    cyclic
+        Names of components along which the model is the same everywhere, such as the position ``("y",)`` of a
+        walker on level ground. A shift of one of them must change no field, guard and condition, and resets
+        must shift with it, which is checked for each of them alone. Orbits close up to a shift
+        (``orbit.shift``), and states that differ by a shift are near for attractors.
     outputs
         Quantities that follow from time, state and parameters, such as a contact force, by name:
         ``{"energy": lambda t, x, p: ...}``, or with a function for some of the modes,
@@ -165,6 +170,7 @@ class HybridSystem(Portable):
     start: str | None = attrs.field(default=None, kw_only=True)
     name: str = attrs.field(default="", kw_only=True, validator=check_name)
     angles: Mapping[str, float] = attrs.field(factory=dict, kw_only=True, repr=False)
+    cyclic: tuple[str, ...] = attrs.field(default=(), kw_only=True, repr=False)
     # Units decide no result, so systems that differ in them are the same model.
     units: Mapping[str, str] = attrs.field(factory=dict, kw_only=True, eq=False, repr=False)
     # Nor do outputs and laws.
@@ -208,9 +214,11 @@ class HybridSystem(Portable):
         for output in self.outputs.values():
             output.check_modes(_written(self, "modes"))
         object.__setattr__(self, "angles", self.variables.as_angles(self.angles))
+        object.__setattr__(self, "cyclic", self.variables.as_cyclic(self.cyclic, self.angles))
         unchecked = self._unchecked()
         check_functions(self.variables, unchecked, self.period)
         check_angles(self.variables, unchecked, self.turn_lengths)
+        check_cyclic(self.variables, authored(unchecked) if self.cyclic else [], self.is_cyclic)
 
     def _write_out_delays(self) -> None:
         """Check what the author wrote, and put components for what is under way into the state."""
@@ -220,6 +228,8 @@ class HybridSystem(Portable):
         check_functions(own, functions, self.period)
         turns = own.as_angles(self.angles)
         check_angles(own, functions, np.array([turns.get(name, 0.0) for name in own.state_names]))
+        cyclic = own.as_cyclic(self.cyclic, turns)
+        check_cyclic(own, authored(functions), np.array([name in cyclic for name in own.state_names]))
         for name, value in written_out(self, own).items():
             object.__setattr__(self, name, value)
 
@@ -284,6 +294,19 @@ class HybridSystem(Portable):
         lengths = np.array([self.angles.get(name, 0.0) for name in self.state_names])
         lengths.flags.writeable = False
         return lengths
+
+    @cached_property
+    def is_cyclic(self) -> np.ndarray:
+        """Whether each component ``(n,)`` is cyclic; read-only."""
+        found = np.array([name in self.cyclic for name in self.state_names])
+        found.flags.writeable = False
+        return found
+
+    def unclosed(self, change: np.ndarray) -> np.ndarray:
+        """Changes ``(..., k)`` of the first components, without whole turns and shifts along cyclic ones."""
+        k = change.shape[-1]
+        closed = closed_change(change, self.turn_lengths[:k])
+        return np.where(self.is_cyclic[:k], 0.0, closed) if self.cyclic else closed
 
     @property
     def state_names(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""Check that the forcing period and the turns of angles are periods of the model functions."""
+"""Check that periods, turns of angles and shifts along cyclic components change no model function."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ Period = float | Callable[..., Any] | None
 # Functions are compared at these fractions of the period, with the sample states scaled by these sizes.
 PHASES = (0.1180, 0.3651, 0.7487)
 SIZES = (1.0, 1e-2, 1.0, 10.0)
+# A cyclic component is moved by these; the second one changes the sign of a sample state.
+SHIFTS = (0.7390851, -137.035999)
 # Relative error allowed in a period.
 LOOSE = 1e-12
 # Number of evaluations with arguments moved by rounding.
@@ -88,7 +90,7 @@ def rounding(
 class Shift:
     """A change of the time and of the state that no function may see.
 
-    ``lengths (n,)`` are those of a turn: a reset may differ by whole turns.
+    ``lengths (n,)`` are those of a turn. A reset takes the change of the state along, up to whole turns.
     """
 
     t: float
@@ -99,7 +101,7 @@ class Shift:
         """How far two values of a function are apart."""
         change = there - here
         if function.completed is not None:
-            change = closed_change(change, self.lengths)
+            change = closed_change(change - self.x, self.lengths)
         return np.abs(change)
 
 
@@ -172,5 +174,34 @@ def angle_fault_at(
                 f"HybridSystem: angles: {name!r} is no angle with a turn of {lengths[i]:.10g}. "
                 f"{function.title} is {here:.10g} {variables.described(t, x, values)}, and {there:.10g} a "
                 "turn further. Correct the length of the turn, or leave the component out of angles=."
+            )
+    return None
+
+
+def cyclic_fault_at(
+    variables: Variables,
+    function: ModelFunction,
+    t: float,
+    x: np.ndarray,
+    values: np.ndarray,
+    cyclic: np.ndarray,
+) -> str | None:
+    """Error text if a function differs by more than rounding after a shift of a component, else None.
+
+    ``cyclic (n,)`` tells the components that are shifted, one after the other. A reset shifts with them.
+    """
+    for i in np.flatnonzero(cyclic):
+        for size in SHIFTS:
+            moved = size * (np.arange(len(x)) == i)
+            found = _fault(variables, function, t, x, values, Shift(0.0, moved, np.zeros(len(x))))
+            if found is None:
+                continue
+            name, (here, there) = variables.state_names[i], found
+            return (
+                f"HybridSystem: cyclic: {name!r} is not cyclic. {function.title} is {here:.10g} "
+                f"{variables.described(t, x, values)}, and {there:.10g} where {name!r} alone is larger by "
+                f"{size:.6g}; fields, guards and conditions must not depend on a cyclic component, and "
+                f"a reset must shift with it. Leave {name!r} out of cyclic=, or take differences of positions "
+                "as components of the state."
             )
     return None

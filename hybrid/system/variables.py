@@ -210,6 +210,23 @@ class Variables:
             given[name] = arguments.positive(f"HybridSystem: angles[{name!r}]", turn)
         return FrozenMapping(given)
 
+    def as_cyclic(self, value: object, angles: Iterable[str]) -> tuple[str, ...]:
+        """Names of cyclic components; one name of a repeat stands for the components of all members."""
+        title, names = "HybridSystem: cyclic", self.state_names[: self.tangent_dimension]
+        wanted = "be names of components of the state, such as ('y',)"
+        given = arguments.items(title, value, wanted)
+        if not all(isinstance(each, str) for each in given):
+            raise arguments.refusal(title, wanted, value)
+        found = [each for name in given for each in self._shared_components.get(name, (name,))]
+        for name in found:
+            arguments.known(f"{title}: State component", name, names, STATE)
+            if name in angles:
+                raise ModelError(
+                    f"{title}: {name!r} is in angles= too. Orbits close up to whole turns of an angle, and "
+                    "up to any shift of a cyclic component: leave it out of one of the two."
+                )
+        return tuple(dict.fromkeys(found))
+
     def state_values(self, name: str, value: object) -> np.ndarray:
         """A finite state ``(n,)`` from the argument ``name``: numbers in order, or with names as labels.
 

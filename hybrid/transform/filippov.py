@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from hybrid.errors import ModelError, shown
@@ -26,6 +26,7 @@ def filippov(
     name: str = "",
     units: Mapping[str, str] | None = None,
     angles: Mapping[str, float] | None = None,
+    cyclic: Iterable[str] = (),
     outputs: Mapping[str, Any] | None = None,
     laws: Laws | None = None,
 ) -> HybridSystem:
@@ -58,7 +59,7 @@ def filippov(
     switching
         Scalar function ``h(t, x, p)``, which must be traceable. Its gradient must not vanish where ``h = 0``.
         The sliding mode needs ``h`` to be twice differentiable.
-    start, period, name, units, angles, outputs, laws
+    start, period, name, units, angles, cyclic, outputs, laws
         As for `HybridSystem`.
 
     Returns
@@ -149,6 +150,7 @@ def filippov(
         name=name,
         units={} if units is None else units,
         angles={} if angles is None else angles,
+        cyclic=cyclic,
         outputs={} if outputs is None else outputs,
         laws=Laws() if laws is None else laws,
         derived_from=Watched([below, above, switching]),

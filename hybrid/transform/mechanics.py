@@ -7,7 +7,9 @@ from typing import Any
 
 from hybrid import arguments
 from hybrid.errors import HybridError, ModelError
+from hybrid.system.checks import check_cyclic
 from hybrid.system.elements import Function, Mode
+from hybrid.system.functions import ModelFunction
 from hybrid.system.graph import HybridSystem
 from hybrid.system.laws import Laws
 from hybrid.system.outputs import as_outputs
@@ -37,6 +39,7 @@ def mechanics(
     start: str | None = None,
     units: Mapping[str, str] | None = None,
     angles: Mapping[str, float] | None = None,
+    cyclic: Iterable[str] = (),
     outputs: Mapping[str, Any] | None = None,
     laws: Laws | None = None,
 ) -> HybridSystem:
@@ -68,8 +71,9 @@ def mechanics(
         another, in listed order, where several close together.
     together
         Gaps below this count as closed when another contact closes: they take part in its impact.
-    period, name, start, units, angles, outputs, laws
-        As for `HybridSystem`.
+    period, name, start, units, angles, cyclic, outputs, laws
+        As for `HybridSystem`. Along a cyclic coordinate the accelerations without contacts, all gaps, slips
+        and coefficients are the same.
 
     Returns
     -------
@@ -166,17 +170,30 @@ def mechanics(
         name=name,
         units={} if units is None else units,
         angles={} if angles is None else angles,
+        cyclic=cyclic,
         outputs={**own, **system.outputs},
         laws=Laws() if laws is None else laws,
         derived_from=Watched([each for each in functions if callable(each)]),
     )
+    check_cyclic(original.variables, _moved_by(free, touching), original.is_cyclic)
     called = {
         **{"coordinates": q, "velocities": u, "contacts": touching, "parameters": parameters},
         **{"mass": mass, "forces": forces, "kinetic": kinetic, "potential": potential},
         **{"impacts": impacts, "together": together, "period": period, "name": name, "start": start},
-        **{"units": units, "angles": angles, "outputs": outputs, "laws": laws},
+        **{"cyclic": cyclic, "units": units, "angles": angles, "outputs": outputs, "laws": laws},
     }
     return ContactGrowth(judge, original, Origin(mechanics, called), start).current
+
+
+def _moved_by(free: Function, contacts: Iterable[Contact]) -> list[ModelFunction]:
+    """What the motion depends on: the accelerations without contacts, gaps, slips and coefficients."""
+    found = [ModelFunction("mechanics", "motion without contacts", free, "", None, None)]
+    for each in contacts:
+        for what in ("gap", "slip", "restitution", "friction", "static"):
+            function = getattr(each, what)
+            if callable(function):
+                found.append(ModelFunction(each.title, what, function, "", None, None))
+    return found
 
 
 def _names(what: str, value: Iterable[str]) -> tuple[str, ...]:

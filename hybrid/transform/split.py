@@ -21,6 +21,7 @@ def from_equations(
     name: str = "",
     units: Mapping[str, str] | None = None,
     angles: Mapping[str, float] | None = None,
+    cyclic: Iterable[str] = (),
     outputs: Mapping[str, Any] | None = None,
     laws: Laws | None = None,
     modes: Mapping[str, Any] | None = None,
@@ -34,7 +35,7 @@ def from_equations(
     ----------
     field
         ``f(t, x, p)``, which returns the ``n`` derivatives. It must be traceable.
-    state, parameters, period, name, units, angles, outputs, laws
+    state, parameters, period, name, units, angles, cyclic, outputs, laws
         As for `HybridSystem`.
     modes
         Names for the modes, as for `split`.
@@ -70,6 +71,7 @@ def from_equations(
             name=name,
             units={} if units is None else units,
             angles={} if angles is None else angles,
+            cyclic=cyclic,
             outputs={} if outputs is None else outputs,
             laws=Laws() if laws is None else laws,
             repeats=repeats,

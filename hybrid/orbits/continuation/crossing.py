@@ -56,8 +56,9 @@ def _repeated(place: Place, times: int) -> Place | None:
     first, last = loop.x.size, loop.x.size + len(loop.times)
     change = place.units * place.tangents[0]
     moved, longer = change[first:last], change[last - 1] - change[first]
+    shift = np.where(family.system.is_cyclic[: family.n], place.orbit.change, 0.0)
     again = Loop(
-        np.tile(loop.x, (times, 1)),
+        np.concatenate([loop.x + k * shift for k in range(times)]),
         np.concatenate([loop.times[:1], *(loop.times[1:] + k * loop.period for k in range(times))]),
         loop.values,
     )

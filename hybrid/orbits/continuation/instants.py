@@ -31,7 +31,8 @@ def instants_of(orbit: Pass) -> tuple[Names, np.ndarray, np.ndarray]:
 def passes_by(start: Place, before: Place, after: Place) -> float | None:
     """The share of a step at which it passes the start of a walk; None if it does not.
 
-    Whole turns of angles, whole forcing periods and the choice of the first jump make no other orbit.
+    Whole turns of angles, shifts along cyclic components, whole forcing periods and the choice of the first
+    jump make no other orbit.
     """
     wanted, names = (instants_of(each.orbit)[0] for each in (start, after))
     if instants_of(before.orbit)[0] != names:
@@ -47,7 +48,8 @@ def _passes_by(start: Place, before: Place, after: Place, first: int) -> float |
     _, x, times = instants_of(start.orbit)
     turns = family.system.turn_lengths[: family.n]
     there, here = (_from(each.orbit, first) for each in (before, after))
-    around = turns * whole_turns(np.mean(here[:, :-1] - x, axis=0), turns)
+    moved = np.mean(here[:, :-1] - x, axis=0)
+    around = np.where(_cyclic(start.orbit), moved, turns * whole_turns(moved, turns))
     late = float(np.mean(here[:, -1] - times))
     if family.forced:
         forcing = family.period(start.values) / family.periods
@@ -77,13 +79,14 @@ def _from(orbit: Pass, first: int) -> np.ndarray:
 def halves(orbit: Pass, count: int = 2) -> np.ndarray | None:
     """How far the second half of an orbit is from the first ``(E n / 2,)``; None if they differ in jumps.
 
-    Or by how much its parts are apart that follow each other, of so many.
+    Or by how much its parts are apart that follow each other, of so many. Shifts do not count.
     """
     names, x, _ = instants_of(orbit)
     part = len(names) // count
     if len(names) % count or names[part:] != names[:-part]:
         return None
-    return np.asarray(((x[part:] - x[:-part]) / orbit.scale).ravel())
+    apart = np.where(_cyclic(orbit), 0.0, x[part:] - x[:-part])
+    return np.asarray((apart / orbit.scale).ravel())
 
 
 def _returns(orbit: Pass, count: int) -> bool:
@@ -91,7 +94,12 @@ def _returns(orbit: Pass, count: int) -> bool:
     loop = orbit.loop
     _, x = moment(orbit, *share_of(orbit, float(loop.times[0] + loop.period / count)))
     away = (x - orbit.whole(0, loop.x[0]))[: orbit.family.n] / orbit.scale
-    return bool(np.linalg.norm(away) <= SAME)
+    return bool(np.linalg.norm(np.where(_cyclic(orbit), 0.0, away)) <= SAME)
+
+
+def _cyclic(orbit: Pass) -> np.ndarray:
+    """Whether each component ``(n,)`` is cyclic."""
+    return np.asarray(orbit.family.system.is_cyclic[: orbit.family.n])
 
 
 def is_repeated(orbit: Pass) -> bool:

@@ -55,8 +55,16 @@ class Pass:
 
     @property
     def is_point(self) -> bool:
-        """Whether nothing moves along it: an equilibrium of an autonomous system is no orbit."""
-        return not self.family.forced and bool(np.all(np.ptp(self._states, axis=0) <= NO_SIZE * self.scale))
+        """Whether nothing moves along it but cyclic components: an equilibrium is no orbit."""
+        if self.family.forced:
+            return False
+        still = np.ptp(self._states, axis=0) <= NO_SIZE * self.scale
+        return bool(np.all(still | self._cyclic))
+
+    @property
+    def _cyclic(self) -> np.ndarray:
+        """Whether each component ``(n,)`` is cyclic."""
+        return np.asarray(self.family.system.is_cyclic[: self.loop.x.shape[1]])
 
     @property
     def extremes(self) -> np.ndarray:
@@ -162,7 +170,7 @@ class Pass:
 
     @property
     def change(self) -> np.ndarray:
-        """Change ``(n,)`` of the state over the period: whole turns of angles, and zero but for errors."""
+        """Change ``(n,)`` of the state over the period: whole turns of angles and shifts, else but errors."""
         pairs = zip(self.flows, self.landings, strict=True)
         ends = [flow.end if landing is None else landing.after for flow, landing in pairs]
         return np.asarray(np.sum(np.array(ends) - np.roll(self.loop.x, -1, axis=0), axis=0))
@@ -227,9 +235,9 @@ class Pass:
     def free_multipliers(self) -> np.ndarray:
         """The multipliers ``(n - r,)`` but those that are 1 on every orbit of the family, largest first.
 
-        The field of an autonomous system is a right eigenvector of the tangent map over the period, and the
-        gradient of a held quantity a left one. What is left is the map of the states of one value of each
-        quantity, across the field.
+        The field of an autonomous system and the directions of cyclic components are right eigenvectors of
+        the tangent map over the period, and the gradient of a held quantity is a left one. What is left is
+        the map of the states of one value of each quantity, across the field and the shifts.
         """
         basis, maps = self._free_directions, self._turned_maps
         product = basis
@@ -279,8 +287,10 @@ class Pass:
 
     @property
     def _free_directions(self) -> np.ndarray:
-        """An orthonormal basis ``(n, n - r)`` of the scaled states across the field and held gradients."""
-        taken = [] if self.family.forced else [self.flows[self._first].first_rate / self.scale]
+        """An orthonormal basis ``(n, n - r)`` of scaled states across field, shifts and held gradients."""
+        taken = [*np.eye(len(self.scale))[self._cyclic]]
+        if not self.family.forced:
+            taken.append(self.flows[self._first].first_rate / self.scale)
         if self.departure is not None:
             taken += [*self.departure[1][:, : len(self.scale)] * self.scale]
         if not taken:
@@ -332,6 +342,7 @@ class Pass:
         matrix, values = (each.copy() for each in self._stretch_by_stretch)
         if self.departure is not None and anchor.departure is not None:
             self._hold(*self.departure, anchor.departure[1][:, :n], anchor.scale, matrix, values)
+        self._let_shift(anchor, matrix, values)
         self._close(anchor, matrix[-1], values, first)
         matrix *= units
         sizes = np.concatenate([np.tile(anchor.scale, count), np.abs(matrix[first:]).max(axis=1)])
@@ -373,6 +384,15 @@ class Pass:
         turns = self.family.system.turn_lengths[:n]
         values[:first] = (closed_change(change, turns) if turns.any() else change).ravel()
         return matrix, values
+
+    def _let_shift(self, anchor: Pass, matrix: np.ndarray, values: np.ndarray) -> None:
+        """A cyclic component has any value at the end of the orbit, and at its start that of the anchor."""
+        count, n = self.loop.x.shape
+        [own] = np.nonzero(self._cyclic)
+        rows = (count - 1) * n + own
+        matrix[rows] = 0.0
+        matrix[rows, own] = 1.0
+        values[rows] = self.loop.x[0, own] - anchor.loop.x[0, own]
 
     def _join(self, i: int, row: np.ndarray, values: np.ndarray, first: int) -> None:
         """A stretch that goes on smoothly ends at its share of the time between two jumps."""
@@ -433,6 +453,6 @@ class Pass:
             row[first], values[-1] = 1.0, loop.times[0] - anchor.loop.times[0]
         else:
             n = loop.x.shape[1]
-            across = anchor.flows[0].first_rate / anchor.scale**2
+            across = np.where(self._cyclic, 0.0, anchor.flows[0].first_rate / anchor.scale**2)
             row[:n] = across
             values[-1] = across @ (loop.x[0] - anchor.loop.x[0])

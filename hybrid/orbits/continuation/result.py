@@ -11,7 +11,7 @@ from hybrid.orbits.continuation.order import order_status
 from hybrid.orbits.continuation.passing import CLOSED, Pass
 from hybrid.orbits.continuation.place import moment, share_of
 from hybrid.orbits.continuation.route import Route
-from hybrid.orbits.orbit import PeriodicOrbit, first_start, turns_over, unaged
+from hybrid.orbits.orbit import PeriodicOrbit, first_start, shift_over, turns_over, unaged
 from hybrid.simulation.arc import HybridArc
 from hybrid.solvers import Solver
 from hybrid.status import SUCCESS
@@ -117,6 +117,7 @@ def _orbit_from(orbit: Pass, i: int, share: float, t0: float, has_matrix: bool) 
         transitions=tuple(fired),
         status=SUCCESS,
         turns=turns_over(family.system, orbit.change),
+        shift=shift_over(family.system, orbit.change),
     )
 
 

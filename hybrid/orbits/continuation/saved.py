@@ -12,12 +12,11 @@ import numpy as np
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
 from hybrid.orbits.continuation.labelled import THERE
 from hybrid.orbits.listed import saved_sides, saved_status
-from hybrid.orbits.orbit import PeriodicOrbit, turns_over
+from hybrid.orbits.orbit import PeriodicOrbit, shift_over, turns_over
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Taylor
 from hybrid.status import SUCCESS
 from hybrid.system.graph import HybridSystem
-from hybrid.system.periodicity import closed_change
 
 if TYPE_CHECKING:
     import xarray
@@ -119,10 +118,11 @@ def _orbit(
         multipliers=multipliers.real if np.all(multipliers.imag == 0.0) else multipliers,
         log_moduli=moduli,
         fundamental=arc.fundamental,
-        residual=float(np.linalg.norm(closed_change(change, system.turn_lengths[: len(change)]))),
+        residual=float(np.linalg.norm(system.unclosed(change))),
         iterations=0,
         signature=(mode, *(str(jump.target) for jump in arc.jumps)),
         transitions=tuple(map(str, arc.jumps.transition)),
         status=SUCCESS,
         turns=turns_over(system, change),
+        shift=shift_over(system, change),
     )

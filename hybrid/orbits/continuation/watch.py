@@ -132,7 +132,7 @@ def _where(orbit: Pass) -> str:
 
 
 def checked_outputs(given: object, system: HybridSystem) -> dict[str, OfArc]:
-    """The functions that ``outputs=`` gives, whose names must be new; empty for None."""
+    """The functions that ``outputs=`` gives, whose names must be new, and the shifts of cyclic components."""
     found = _functions("outputs", given)
     for name in found:
         if name in (*system.quantity_names, *system.parameters):
@@ -142,7 +142,23 @@ def checked_outputs(given: object, system: HybridSystem) -> dict[str, OfArc]:
             )
         if name in TAKEN or name.endswith(THERE):
             raise ArgumentError(f"outputs: {name!r} is a name that every branch has; give it another one.")
-    return found
+    shifts = {f"shift of {name}": ShiftOf(name) for name in system.cyclic}
+    for name in found:
+        if name in shifts:
+            raise ArgumentError(f"outputs: {name!r} is on every branch of this system; leave it out.")
+    return {**shifts, **found}
+
+
+@attrs.frozen
+class ShiftOf:
+    """By how much a cyclic component is larger at the end of an arc; a class, to be pickled."""
+
+    name: str
+
+    def __call__(self, arc: HybridArc) -> float:
+        """The difference of the two ends."""
+        values = arc[self.name]
+        return float(values[-1] - values[0])
 
 
 def checked_events(given: object) -> dict[str, OfArc]:
@@ -181,4 +197,7 @@ def checked_stop(
 def units_of(outputs: Mapping[str, OfArc], system: HybridSystem) -> dict[str, str]:
     """Units of outputs, by name: of measures, if the system gives them."""
     found = {name: each.unit(system) for name, each in outputs.items() if isinstance(each, Measure)}
+    found |= {
+        name: system.units.get(each.name) for name, each in outputs.items() if isinstance(each, ShiftOf)
+    }
     return {name: unit for name, unit in found.items() if unit is not None}

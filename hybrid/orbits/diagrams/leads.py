@@ -65,7 +65,7 @@ def numbers_of(start: Start) -> dict[str, Any]:
         return {"mode": start.mode, "x": start.x.tolist(), "parameters": dict(start.parameters)}
     fields = attrs.asdict(start, recurse=False, filter=lambda field, _: field.name != "system")
     fields |= {name: _listed(np.asarray(fields[name])) for name in ARRAYS}
-    fields |= {name: dict(fields[name]) for name in ("parameters", "turns")}
+    fields |= {name: dict(fields[name]) for name in ("parameters", "turns", "shift")}
     status = fields["status"]
     fields["status"] = [status.code.name, status.message, status.remedy]
     found: dict[str, Any] = json.loads(json.dumps(fields))

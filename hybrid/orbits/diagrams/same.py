@@ -122,12 +122,12 @@ def _is_same(found: PeriodicOrbit, near: PeriodicOrbit, solver: Solver) -> bool:
 def distances(system: HybridSystem, arc: HybridArc, times: np.ndarray, x: np.ndarray) -> np.ndarray:
     """How far states of an arc at some times are from a state ``(N,)``, in units of what components move.
 
-    Whole turns of angles do not count, nor do counters and the time since the entry of a mode.
+    Whole turns of angles and shifts do not count, nor do counters and the time since the entry of a mode.
     """
     system = original_of(system)
     n = system.tangent_dimension
     states, sizes, x = (without_age(system, each)[..., :n] for each in (arc(times), extents(arc), x))
-    return np.asarray((np.abs(closed_change(states - x, system.turn_lengths[:n])) / sizes).max(axis=-1))
+    return np.asarray((np.abs(system.unclosed(states - x)) / sizes).max(axis=-1))
 
 
 def extents(arc: HybridArc) -> np.ndarray:

@@ -20,6 +20,7 @@ from hybrid.sweep.attractors.attractor import UNKNOWN, Attractor
 from hybrid.sweep.attractors.runs import Points
 from hybrid.sweep.attractors.setup import Setup
 from hybrid.system.elements import Guard
+from hybrid.system.graph import HybridSystem
 from hybrid.system.periodicity import closed_change
 from hybrid.transform.markers import with_section
 
@@ -89,9 +90,13 @@ def find(setup: Setup, x0: np.ndarray, mode: str | None) -> Found | None:
 
 
 def collected(points: Points, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """The next points of a run with angles within the first turn, and their modes and jumps."""
+    """The next points of a run, with their modes and jumps.
+
+    Angles are within the first turn, and cyclic components, which may grow without bound, are 0.
+    """
     states, places = points.more(count)
-    states = within_turns(states, points.runs.setup.turns)
+    setup = points.runs.setup
+    states = np.where(setup.system.is_cyclic, 0.0, within_turns(states, setup.turns))
     if points.code != codes.DONE:
         # A run that needs a mode which has not been made yet is repeated.
         status_of(points.trajectory, points.code)
@@ -113,13 +118,14 @@ def extent_of(states: np.ndarray, setup: Setup) -> np.ndarray:
     """Size of what a run visits ``(n,)``; that of the state itself where a component does not change.
 
     A change or a size below ``ERRORS`` times the solver's tolerances is an error of the run. The size of an
-    angle is its turn.
+    angle is its turn. That of a cyclic component is infinite: states that differ by a shift are near.
     """
     extent, size = np.ptp(states, axis=0), np.abs(states).max(axis=0)
     small = ERRORS * setup.solver.atol
     changes, counts = extent > ERRORS * setup.solver.rtol * size + small, size > small
     still = np.where(counts, size, 1.0)
-    return np.where(setup.turns > 0, setup.turns, np.where(changes, extent, still))
+    found = np.where(setup.turns > 0, setup.turns, np.where(changes, extent, still))
+    return np.where(setup.system.is_cyclic, np.inf, found)
 
 
 def round_of(
@@ -172,13 +178,14 @@ def _periodic(setup: Setup, points: Points, count: int, extent: np.ndarray, x0: 
 
 
 def _orbit(setup: Setup, x: np.ndarray, mode: str, time: float) -> np.ndarray:
-    """How far the components move over a time ``(n,)``."""
+    """How far the components move over a time ``(n,)``; infinite for cyclic ones."""
     span = (setup.t0, setup.t0 + time)
     arc = simulate(setup.system, x, span, mode=mode, parameters=setup.parameters, solver=setup.solver)
     states = np.vstack([arc.x, arc(np.linspace(arc.t[0], arc.t[-1], 64 * LOOKED_AT))])
     turns = setup.turns
     moved = np.ptp(states, axis=0)
-    return np.asarray(np.where(turns > 0.0, np.minimum(moved, turns), moved))
+    moved = np.where(turns > 0.0, np.minimum(moved, turns), moved)
+    return np.asarray(np.where(setup.system.is_cyclic, np.inf, moved))
 
 
 def _log_moduli(setup: Setup, x: np.ndarray, mode: str, period: float) -> np.ndarray:
@@ -210,7 +217,7 @@ def _wandering(
     moved = np.maximum(_orbit(setup, origin, mode, LOOKED_AT * pace), np.ptp(states, axis=0))
     names = np.array(run.system.mode_names)
     attractor = Attractor(
-        kind=_kind(exponents, error, forced=setup.system.period is not None),
+        kind=_kind(exponents, error, neutral(setup.system)),
         points=states,
         mode=names[places[:, 0]],
         round=0,
@@ -301,19 +308,24 @@ def _exponents(setup: Setup, x: np.ndarray, mode: str, pace: float) -> tuple[np.
         mean = TaperedMean(n)
         mean.add(growths)
         values, error = mean.value(), standard_error(growths) * taper_inflation()
-        zeros = int(np.sum(np.abs(values) <= 2 * error)) - (0 if setup.system.period is not None else 1)
+        zeros = int(np.sum(np.abs(values) <= 2 * error)) - neutral(setup.system)
         if zeros <= 0 or len(rows) < count or len(growths) >= MOST_INTERVALS:
             order = np.argsort(-values, kind="stable")
             return values[order], error[order]
 
 
-def _kind(exponents: np.ndarray, error: np.ndarray, *, forced: bool) -> str:
-    """The kind of motion by the signs of its exponents; without forcing one of them is that of the flow."""
+def neutral(system: HybridSystem) -> int:
+    """How many exponents are zero by nature: that of the flow, without forcing, and those of shifts."""
+    return len(system.cyclic) + (0 if system.period is not None else 1)
+
+
+def _kind(exponents: np.ndarray, error: np.ndarray, neutral: int) -> str:
+    """The kind of motion by the signs of its exponents, of which so many are zero by nature."""
     # The error of a direction that jumps annihilate, whose exponent is minus infinity, is not known.
     if np.isnan(exponents).any() or np.isnan(error[np.isfinite(exponents)]).any():
         return UNKNOWN
     zero = np.abs(exponents) <= 2 * error
     if np.any((exponents > 0) & ~zero):
         return "chaotic"
-    zeros = int(zero.sum()) - (0 if forced else 1)
+    zeros = int(zero.sum()) - neutral
     return "torus" if zeros > 0 else "periodic"

@@ -181,7 +181,8 @@ def _rank(found: Found) -> tuple[Any, ...]:
     attractor = found.attractor
     kind = KINDS.index(attractor.kind) if attractor.kind in KINDS else len(KINDS)
     lowest = min(map(tuple, _cells(found).tolist()))
-    size = found.radius.tolist()
+    # That of a cyclic component is infinite, and its place is 0.
+    size = np.where(np.isfinite(found.radius), found.radius, 0.0).tolist()
     return kind, attractor.round, *(place * unit for place, unit in zip(lowest, size, strict=True))
 
 
