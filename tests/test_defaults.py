@@ -18,7 +18,10 @@ RUN = {**MODEL, "solver": None}
 LONG = {**RUN, "t0": 0.0, "progress": False}
 TOLERANCES = {"rtol": 1e-10, "atol": 1e-12, "max_step": float("inf"), "max_steps": 10**9}
 CHECKING = {"rtol": 1e-12, "atol": 1e-14, "max_step": float("inf"), "max_steps": 20_000}
-SYSTEM = {"period": None, "name": "", "units": None, "angles": None, "outputs": None, "laws": None}
+SYSTEM = {
+    **{"period": None, "name": "", "units": None, "angles": None, "cyclic": ()},
+    **{"outputs": None, "laws": None},
+}
 PLAIN = {"parameters": None, **SYSTEM}
 SEARCH = {
     **{**LONG, "progress": None, "section": None, "interval": None, "periods": 1000, "recurrences": 10},
@@ -55,6 +58,7 @@ DEFAULTS = {
         "start": None,
         "period": None,
         "name": "",
+        "cyclic": (),
         "notes": (),
         "under_way": (),
         "growth": None,

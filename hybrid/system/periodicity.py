@@ -97,11 +97,13 @@ class Shift:
     x: np.ndarray
     lengths: np.ndarray
 
-    def apart(self, function: ModelFunction, here: np.ndarray, there: np.ndarray) -> np.ndarray:
-        """How far two values of a function are apart."""
+    def apart(
+        self, function: ModelFunction, here: np.ndarray, there: np.ndarray, share: float = 1.0
+    ) -> np.ndarray:
+        """How far two values of a function are apart, whose arguments differ by a share of the shift."""
         change = there - here
         if function.completed is not None:
-            change = closed_change(change - self.x, self.lengths)
+            change = closed_change(change - share * self.x, self.lengths)
         return np.abs(change)
 
 
@@ -132,7 +134,7 @@ def _fault(
         near = evaluate(variables, function.value, t + share * shift.t, x + share * shift.x, values)
         if near is None:
             return None
-        band = band + 2.0 * shift.apart(function, there, near)
+        band = band + 2.0 * shift.apart(function, there, near, share - 1.0)
     wrong = apart > band + rounding(variables, function, t, x, values, here)
     if not np.any(wrong):
         return None
@@ -201,7 +203,7 @@ def cyclic_fault_at(
                 f"HybridSystem: cyclic: {name!r} is not cyclic. {function.title} is {here:.10g} "
                 f"{variables.described(t, x, values)}, and {there:.10g} where {name!r} alone is larger by "
                 f"{size:.6g}; fields, guards and conditions must not depend on a cyclic component, and "
-                f"a reset must shift with it. Leave {name!r} out of cyclic=, or take differences of positions "
-                "as components of the state."
+                f"a reset must shift with it. Leave {name!r} out of cyclic=, or take differences of "
+                "positions as components of the state."
             )
     return None

@@ -34,6 +34,7 @@ BAD_STATES = [
 DATED = {"unit": [3, True, "h", Odd()], "origin": [3, True, "2024-01-31", Odd()]}
 COLUMNS = [3, "a", [1.0], {"a": [1.0]}, {"a": 1.0}, Odd()]
 REPEATS = [None, "a", 3, [3], ["a"], [None], {"cell": 3}, Odd()]
+CYCLIC = [None, "q", 3, True, (3,), ("nope",), [["q"]], Odd()]
 MEMORY = [None, "u", 1, True, ("1u",), ("u", "u"), (1,), {"u"}, [["u"]], Odd()]
 
 
@@ -71,6 +72,7 @@ def systems():
                 "name": TEXT,
                 "units": UNITS,
                 "angles": ANGLES,
+                "cyclic": CYCLIC,
                 "modes": CALLED,
                 "repeats": REPEATS,
                 "outputs": OUTPUTS,
@@ -97,6 +99,7 @@ def systems():
                 "name": TEXT,
                 "units": UNITS,
                 "angles": ANGLES,
+                "cyclic": CYCLIC,
                 "outputs": OUTPUTS,
                 "laws": [*FUNCTION, {}, Odd()],
             },
@@ -143,6 +146,7 @@ def systems():
                 "name": TEXT,
                 "units": UNITS,
                 "angles": ANGLES,
+                "cyclic": CYCLIC,
                 "outputs": OUTPUTS,
                 "laws": [None, *FUNCTION, {}, Odd()],
                 "notes": [None, "a", 3, [1], [None], Odd()],
@@ -225,6 +229,7 @@ def systems():
                 "name": TEXT,
                 "units": UNITS,
                 "angles": ANGLES,
+                "cyclic": CYCLIC,
                 "outputs": OUTPUTS,
                 "laws": [*FUNCTION, {}, Odd()],
             },
