@@ -26,6 +26,7 @@ from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode, noting
 from hybrid.system.entries import are_ageless
 from hybrid.system.graph import HybridSystem
+from hybrid.system.growth import Unexplored, stage_of
 
 # Points, besides the solver's own, that show how far an orbit moves.
 SAMPLES = 65
@@ -385,8 +386,12 @@ class Shooting:
         return bool(np.any(np.abs(drift) > noise))
 
     def follow(self, point: Point, span: float, mode: str | None, max_jumps: int = 100_000) -> HybridArc:
-        """The arc from a point over a time, without tangent vectors."""
-        return simulate(
+        """The arc from a point over a time, without tangent vectors.
+
+        Unexplored if it has made modes of a growing system: shots would not have them.
+        """
+        stage = stage_of(self.system)
+        arc = simulate(
             self.system,
             self.whole(point),
             (point.t, point.t + span),
@@ -395,6 +400,9 @@ class Shooting:
             solver=self.solver,
             max_jumps=max_jumps,
         )
+        if stage_of(self.system) is not stage:
+            raise Unexplored
+        return arc
 
     def _status(self, shot: Shot, newton: Newton, iterations: int, tolerance: float) -> Status:
         """How Newton's method ended: with an orbit, or why there is none."""
