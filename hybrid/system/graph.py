@@ -40,7 +40,7 @@ from hybrid.system.periodicity import Period, closed_change, period_at
 from hybrid.system.portable import Portable
 from hybrid.system.repeat import Repeat
 from hybrid.system.switching import switching_inside
-from hybrid.system.variables import Variables, as_counters, as_held, as_parameters, as_state
+from hybrid.system.variables import Variables, as_counters, as_cyclic, as_held, as_parameters, as_state
 from hybrid.system.watched import Watched
 
 if TYPE_CHECKING:
@@ -95,10 +95,9 @@ class HybridSystem(Portable):
         functions must be the same, which is checked; a reset may add whole turns. Orbits close, and
         attractors are near, up to whole turns. The state itself is never wrapped.
     cyclic
-        Names of components along which the model is the same everywhere, such as the position ``("y",)`` of a
-        walker on level ground. A shift of one of them must change no field, guard and condition, and resets
-        must shift with it, which is checked for each of them alone. Orbits close up to a shift
-        (``orbit.shift``), and states that differ by a shift are near for attractors.
+        Names of components along which the model is the same everywhere, such as a walker's position. A shift
+        of one of them must change no field, guard and condition, and resets must shift with it, which is
+        checked. Orbits close, and attractors are near, up to shifts (``orbit.shift``).
     outputs
         Quantities that follow from time, state and parameters, such as a contact force, by name:
         ``{"energy": lambda t, x, p: ...}``, or with a function for some of the modes,
@@ -170,7 +169,7 @@ class HybridSystem(Portable):
     start: str | None = attrs.field(default=None, kw_only=True)
     name: str = attrs.field(default="", kw_only=True, validator=check_name)
     angles: Mapping[str, float] = attrs.field(factory=dict, kw_only=True, repr=False)
-    cyclic: tuple[str, ...] = attrs.field(default=(), kw_only=True, repr=False)
+    cyclic: tuple[str, ...] = attrs.field(default=(), kw_only=True, converter=as_cyclic, repr=False)
     # Units decide no result, so systems that differ in them are the same model.
     units: Mapping[str, str] = attrs.field(factory=dict, kw_only=True, eq=False, repr=False)
     # Nor do outputs and laws.
@@ -214,7 +213,7 @@ class HybridSystem(Portable):
         for output in self.outputs.values():
             output.check_modes(_written(self, "modes"))
         object.__setattr__(self, "angles", self.variables.as_angles(self.angles))
-        object.__setattr__(self, "cyclic", self.variables.as_cyclic(self.cyclic, self.angles))
+        object.__setattr__(self, "cyclic", self.variables.cyclic_names(self.cyclic, self.angles))
         unchecked = self._unchecked()
         check_functions(self.variables, unchecked, self.period)
         check_angles(self.variables, unchecked, self.turn_lengths)
@@ -228,7 +227,7 @@ class HybridSystem(Portable):
         check_functions(own, functions, self.period)
         turns = own.as_angles(self.angles)
         check_angles(own, functions, np.array([turns.get(name, 0.0) for name in own.state_names]))
-        cyclic = own.as_cyclic(self.cyclic, turns)
+        cyclic = own.cyclic_names(self.cyclic, turns)
         check_cyclic(own, authored(functions), np.array([name in cyclic for name in own.state_names]))
         for name, value in written_out(self, own).items():
             object.__setattr__(self, name, value)

@@ -210,13 +210,9 @@ class Variables:
             given[name] = arguments.positive(f"HybridSystem: angles[{name!r}]", turn)
         return FrozenMapping(given)
 
-    def as_cyclic(self, value: object, angles: Iterable[str]) -> tuple[str, ...]:
+    def cyclic_names(self, given: Iterable[str], angles: Iterable[str]) -> tuple[str, ...]:
         """Names of cyclic components; one name of a repeat stands for the components of all members."""
         title, names = "HybridSystem: cyclic", self.state_names[: self.tangent_dimension]
-        wanted = "be names of components of the state, such as ('y',)"
-        given = arguments.items(title, value, wanted)
-        if not all(isinstance(each, str) for each in given):
-            raise arguments.refusal(title, wanted, value)
         found = [each for name in given for each in self._shared_components.get(name, (name,))]
         for name in found:
             arguments.known(f"{title}: State component", name, names, STATE)
@@ -365,6 +361,15 @@ def as_state(value: Any) -> tuple[str, ...] | int:
 def as_held(value: Any) -> tuple[str, ...]:
     """Names of held components."""
     return _as_names(value, "held")
+
+
+def as_cyclic(value: Iterable[str]) -> tuple[str, ...]:
+    """Names of cyclic components, which need not be attributes: ``cell[1].y``."""
+    title, wanted = "HybridSystem: cyclic", "be names of components of the state, such as ('y',)"
+    given = arguments.items(title, value, wanted)
+    if not all(isinstance(each, str) for each in given):
+        raise arguments.refusal(title, wanted, value)
+    return tuple(given)
 
 
 def as_counters(value: Any) -> tuple[str, ...]:
