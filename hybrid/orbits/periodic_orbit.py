@@ -77,7 +77,7 @@ def periodic_orbit(
     Returns
     -------
     PeriodicOrbit
-        It closes up to whole turns of the angles that the system declares, and counters go on counting. If
+        It closes up to whole turns of angles and shifts of cyclic components, and counters go on counting. If
         Newton's method did not converge the status says how far it came. The status is ``AMBIGUOUS_ORDER``
         where two events come at one instant and each order has a derivative of its own. An equilibrium of a
         forced system counts as an orbit, because it repeats after each forcing period; an equilibrium of an

@@ -91,7 +91,8 @@ class Branch(Asked):
     """Periodic orbits in order along a branch; the sequence of transitions may change at its bifurcations.
 
     ``branch["q"]`` is a component of the orbits' points, or an output at them; ``branch["peak"]`` is what a
-    function in ``outputs=`` of :func:`hybrid.continue_orbit` makes of the orbits.
+    function in ``outputs=`` of :func:`hybrid.continue_orbit` makes of the orbits. Where ``y`` is cyclic
+    ``branch["shift of y"]`` is by how much it is larger after each orbit.
 
     Attributes
     ----------
@@ -108,7 +109,8 @@ class Branch(Asked):
         Floquet multipliers, ``(N, n)``, largest first.
     stable
         Whether no multiplier is outside the unit circle, ``(N,)``, without those that are 1 on every orbit:
-        of an autonomous system the one along the orbit, and one for each conserved quantity that is held.
+        of an autonomous system the one along the orbit, and one for each conserved quantity that is held and
+        for each cyclic component.
     bifurcations
         Each :class:`Bifurcation`, in order along the branch.
     status

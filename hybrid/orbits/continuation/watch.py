@@ -144,7 +144,7 @@ def checked_outputs(given: object, system: HybridSystem) -> dict[str, OfArc]:
             raise ArgumentError(f"outputs: {name!r} is a name that every branch has; give it another one.")
     shifts = {f"shift of {name}": ShiftOf(name) for name in system.cyclic}
     for name in found:
-        if name in shifts:
+        if name in shifts and found[name] != shifts[name]:
             raise ArgumentError(f"outputs: {name!r} is on every branch of this system; leave it out.")
     return {**shifts, **found}
 

@@ -11,11 +11,14 @@ from hybrid import (
     Contact,
     Guard,
     HybridSystem,
+    Laws,
     Mode,
     ModelError,
     Reset,
     Transition,
     attractors,
+    continue_all,
+    continue_bifurcation,
     continue_orbit,
     filippov,
     from_equations,
@@ -188,6 +191,51 @@ def test_attractors_of_an_autonomous_drive():
     [found] = attractors(stepper(), over, mode="push", section=step, starts=5).values()
     assert (found.kind, found.round) == ("periodic", 1)
     assert found.period == pytest.approx(1.5, rel=1e-8)
+
+
+def test_a_chaotic_attractor_of_what_moves_on():
+    """Duffing's oscillator, whose place drives y: an exponent is 0 by the shift, and that makes no torus."""
+    duffing = HybridSystem(
+        state=("y", "x", "v"),
+        period=2 * np.pi,
+        modes=[Mode("m", lambda t, x, p: (1.0 + x.x, x.v, x.x - x.x**3 - 0.2 * x.v + 0.3 * np.cos(t)))],
+        cyclic=("y",),
+    )
+    over = {"y": (-5.0, 5.0), "x": (-1.0, 1.0), "v": (-1.0, 1.0)}
+    [found] = attractors(duffing, over, starts=3, tolerance=0.05).values()
+    assert found.kind == "chaotic"
+    assert np.abs(found.exponents).min() < 5e-3
+    assert found.exponents.sum() == pytest.approx(-0.2, abs=1e-6)
+
+
+def test_curves_and_diagrams(tmp_path):
+    """Flips lie where ``1 + e^2`` plus the trace is zero, which gives the sine of the phase of the hit."""
+    [flip] = continue_orbit(start(), "A", (0.03, 0.045)).bifurcations
+    curve = continue_bifurcation(flip, {"A": (0.02, 0.08), "e": (0.4, 0.55)})
+    A, e = curve.values.T
+    sine, cosine = 2 * G * (1 + e**2) / (1 + e) ** 2 / W**2, 0.5 * G * (1 - e) / (1 + e) / W
+    np.testing.assert_allclose(A, np.hypot(sine, cosine), rtol=1e-8)
+    np.testing.assert_allclose(curve.outputs["shift of x"], U, rtol=1e-9)
+    found = continue_all(start(), "A", (0.03, 0.041), depth=1, store=tmp_path)
+    assert [round(float(each["shift of x"][0]), 9) for each in found] == [U, 2 * U]
+
+
+def test_conserved_quantities_besides():
+    """A harmonic oscillator of the energy 1/2 drives y by the square of its speed."""
+    system = HybridSystem(
+        state=("y", "q", "v"),
+        parameters={"w": 1.0},
+        modes=[Mode("m", lambda t, x, p: (x.v**2, x.v, -(p.w**2) * x.q))],
+        laws=Laws(conserved={"energy": lambda t, x, p: 0.5 * (x.v**2 + (p.w * x.q) ** 2)}),
+        cyclic=("y",),
+    )
+    orbit = periodic_orbit(system, (3.0, 0.0, 1.0), period=6.2)
+    assert orbit.status.ok
+    assert orbit.shift["y"] == pytest.approx(np.pi, rel=1e-9)
+    branch = continue_orbit(orbit, "w", (0.5, 2.0))
+    np.testing.assert_allclose(branch["shift of y"], np.pi / branch.parameter, rtol=1e-8)
+    assert branch.stable.all()
+    assert not branch.bifurcations
 
 
 def test_an_orbit_that_needs_a_cyclic_component_says_so():
