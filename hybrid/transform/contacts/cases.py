@@ -13,7 +13,7 @@ from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.expression.operations import Less, LessEqual, Not
 from hybrid.system.growth import Place
 from hybrid.transform.contacts.decide import Decision, Judge
-from hybrid.transform.contacts.events import BREAKS, SETTLES, SUDDEN, ContactEvent
+from hybrid.transform.contacts.events import BREAKS, IMPACT, SETTLES, SUDDEN, ContactEvent
 from hybrid.transform.contacts.problem import NOISE, SHARED, Combination, Level, Outcome, matrix, outcome
 from hybrid.transform.contacts.solutions import is_shared, stopped
 from hybrid.transform.contacts.statuses import OPEN, SIGNS, STICKS
@@ -170,6 +170,9 @@ class Happening:
         """
         q: list[Expression] = [*self.mechanics.space.q]
         resting, view = self.decision.resting, self.mechanics.view
+        if self.event.kind == IMPACT and self.event.contact < 0:
+            # At a start a gap may be negative by rounding.
+            resting = self.decision.closed
         if not set(self.opens) & set(resting):
             return q
         level, in_numbers = (self.mechanics.closing(each, resting) for each in (view, numbers))

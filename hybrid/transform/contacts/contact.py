@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from numbers import Real
 from typing import Any
 
 import attrs
-import numpy as np
 
-from hybrid.errors import ModelError, shown
+from hybrid import arguments
+from hybrid.errors import ArgumentError, ModelError, shown
 from hybrid.system.elements import Function
 from hybrid.system.portable import Portable
 
@@ -85,7 +84,8 @@ class Contact(Portable):
             )
         if self.static is not None:
             self._check("static", self.static, None)
-            if _are_numbers(self.static, self.friction) and self.static < self.friction:  # type: ignore[operator]
+            static, kinetic = _number(self.static), _number(self.friction)
+            if static is not None and kinetic is not None and static < kinetic:
                 raise ModelError(
                     f"{self.title}: static friction must be no smaller than friction = {self.friction}; got "
                     f"{self.static}."
@@ -94,7 +94,7 @@ class Contact(Portable):
     def _check(self, what: str, value: Any, most: float | None) -> None:
         if callable(value) or (isinstance(value, str) and value):
             return
-        number = float(value) if isinstance(value, Real) and not isinstance(value, bool | np.bool_) else None
+        number = _number(value)
         if number is None:
             raise ModelError(f"{self.title}: {what} must {MEANING}; got {shown(value)}.")
         if not 0.0 <= number <= (number if most is None else most) or number == float("inf"):
@@ -118,9 +118,15 @@ def _is_name(name: Any) -> bool:
     return not any(each in name for each in ",+") and not name.endswith((" sticks", " slips -", " idle"))
 
 
+def _number(value: Any) -> float | None:
+    """A number; None for what is none, or the name of a parameter."""
+    if isinstance(value, str):
+        return None
+    try:
+        return arguments.number("", value)
+    except ArgumentError:
+        return None
+
+
 def _is_zero(value: Any) -> bool:
-    return _are_numbers(value) and value == 0
-
-
-def _are_numbers(*values: Any) -> bool:
-    return all(isinstance(each, Real) and not isinstance(each, bool | np.bool_) for each in values)
+    return _number(value) == 0.0

@@ -22,7 +22,7 @@ from hybrid.system.outputs import Formula, Output
 from hybrid.transform.contacts.cases import Happening, Written
 from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.contacts.decide import NONE, SEQUENTIAL, SEVERAL_CASES, Decision, Judge, Undecided
-from hybrid.transform.contacts.events import BREAKS, IMPACT, OPENS, SETTLES, STOPS, ContactEvent
+from hybrid.transform.contacts.events import BREAKS, IMPACT, JAMS, OPENS, SETTLES, STOPS, ContactEvent
 from hybrid.transform.contacts.linear import dot
 from hybrid.transform.contacts.modes import Held, held
 from hybrid.transform.contacts.order import order_matters
@@ -33,6 +33,7 @@ from hybrid.transform.contacts.statuses import (
     IDLE,
     OPEN,
     SIGNS,
+    Statuses,
     mode_name,
     statuses_of,
 )
@@ -41,6 +42,8 @@ from hybrid.transform.contacts.view import FORCES, View
 SETTLING, BEGINNING = "settles", "begins"
 # A gain of kinetic energy below this share is rounding.
 GAIN = 1e-9
+# Forces grow beyond all bounds where their equations become singular; this near, a million-fold.
+SINGULAR = 1e-6
 
 
 @attrs.define(eq=False)
@@ -148,7 +151,7 @@ class ContactGrowth:
         """Make what happens at the end of a run; False if nothing can: the run ends there."""
         with self.lock:
             watch = self.frontier[transition]
-            decision = self.judge.decide(watch.event, watch.now, *place)
+            decision = self._decided(watch, place)
             if isinstance(decision, Undecided):
                 watch.undecided = decision
                 self.told[transition] = self._why(watch, decision, self.mechanics.at(*place))
@@ -168,6 +171,13 @@ class ContactGrowth:
             self._remark(watch, decision, place)
             self.stage = None
             return True
+
+    def _decided(self, watch: Watch, place: Place) -> Decision | Undecided:
+        """What happens at an event."""
+        if watch.event.kind != JAMS:
+            return self.judge.decide(watch.event, watch.now, *place)
+        closed = tuple(i for i, each in enumerate(watch.now.statuses) if each != OPEN)
+        return Undecided(NONE, closed, False)
 
     def _remark(self, watch: Watch, decision: Decision, place: Place) -> None:
         """Note what is doubtful about an impact: the order of several, a gain of energy."""
@@ -197,7 +207,7 @@ class ContactGrowth:
 
     def statuses_in(self, mode: str) -> Statuses:
         """What holds at each contact in a mode that has been made."""
-        known = (key[0] for key, each in self.made.items() if each.mode.name == mode)
+        known = (now.statuses for now, each in self.made.items() if each.mode.name == mode)
         return next(known, (OPEN,) * len(self.contacts))
 
     def mass_at(self, t: float, x: np.ndarray, parameters: np.ndarray) -> np.ndarray:
@@ -308,6 +318,9 @@ class ContactGrowth:
     def _watches(self, source: str, now: Combination, forces: Held) -> Iterator[Watch]:
         """What a mode looks out for."""
         view, gaps = self.mechanics.view, self._gaps
+        if forces.solvability is not None:
+            guard = Guard(scalar(forces.solvability - SINGULAR), -1)
+            yield Watch(source, now, ContactEvent(JAMS), guard, NONE)
         for i, (contact, status) in enumerate(zip(self.contacts, now.statuses, strict=True)):
             name = contact.name
 

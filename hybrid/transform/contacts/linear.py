@@ -35,6 +35,30 @@ def solved(
         ``A`` at a state: the largest values become pivots.
     """
     size = len(rows)
+    left, right, pivots = _eliminated(rows, columns, values)
+    found: list[Vector] = [[ZERO] * size for _ in columns]
+    for k in reversed(range(size)):
+        row = pivots[k]
+        for column, solution in enumerate(found):
+            known = node(dot(left[row][k + 1 :], solution[k + 1 :]))
+            solution[k] = (right[row][column] - known) / left[row][k]
+    return found
+
+
+def determinant(rows: Sequence[Sequence[Expression]], values: np.ndarray) -> Expression:
+    """The determinant of ``A`` but for a sign: positive where ``A`` has these ``values``."""
+    left, _, pivots = _eliminated(rows, [], values)
+    # The row operations change no determinant, and the order of the rows only its sign.
+    positive = np.linalg.det(np.array(values, dtype=float)[pivots]) > 0.0
+    product = multiply(*(left[row][k] for k, row in enumerate(pivots)))
+    return product if positive else -product
+
+
+def _eliminated(
+    rows: Sequence[Sequence[Expression]], columns: Sequence[Vector], values: np.ndarray
+) -> tuple[list[Vector], list[Vector], list[int]]:
+    """``A`` and ``B`` by rows after elimination, and the rows of the pivots."""
+    size = len(rows)
     left = [[node(each) for each in row] for row in rows]
     right = [[node(column[i]) for column in columns] for i in range(size)]
     numbers = np.array(values, dtype=float)
@@ -54,10 +78,4 @@ def solved(
                     a if b is ZERO else a - multiply(share, b)
                     for a, b in zip(entries[i], entries[pivot], strict=True)
                 ]
-    found: list[Vector] = [[ZERO] * size for _ in columns]
-    for k in reversed(range(size)):
-        row = pivots[k]
-        for column, solution in enumerate(found):
-            known = node(dot(left[row][k + 1 :], solution[k + 1 :]))
-            solution[k] = (right[row][column] - known) / left[row][k]
-    return found
+    return left, right, pivots

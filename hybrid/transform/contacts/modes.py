@@ -9,12 +9,21 @@ import attrs
 import numpy as np
 
 from hybrid.expression.evaluation import Program, expressed
+from hybrid.expression.graph import mentions
 from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.system.elements import Function
 from hybrid.system.growth import Place
 from hybrid.transform.contacts.equations import Space
-from hybrid.transform.contacts.problem import DEPENDENT, Combination, Level, bound, matrix, outcome
-from hybrid.transform.contacts.statuses import IDLE, OPEN, STICKS
+from hybrid.transform.contacts.problem import (
+    DEPENDENT,
+    Combination,
+    Level,
+    bound,
+    matrix,
+    outcome,
+    solvability,
+)
+from hybrid.transform.contacts.statuses import IDLE, OPEN, SIGNS, STICKS
 from hybrid.transform.contacts.view import FORCES, Mechanics, View
 
 # Of a difference that estimates a slope.
@@ -34,6 +43,8 @@ class Held:
     normal, tangential, bounds
         By contact: the forces, by one choice where several would do, and the largest friction of one that
         sticks.
+    solvability
+        How far the equations of the forces are from being singular, if friction may make them so; else None.
     undetermined
         Names ``(contact, "normal")`` of those.
     """
@@ -43,6 +54,7 @@ class Held:
     normal: list[Expression]
     tangential: list[Expression]
     bounds: list[Expression]
+    solvability: Expression | None = None
     undetermined: frozenset[tuple[int, str]] = frozenset()
 
 
@@ -90,7 +102,11 @@ def held(
         for row in mechanics.places[i][1:]
         if row
     ]
-    return Held(field, expressed(kept), normal, tangential, bounds, unknown)
+    room = None
+    if any(each in SIGNS for each in case.statuses):
+        found = solvability(level, case, numbers)
+        room = found if mentions(found, (space.t, *space.q, *space.u)) else None
+    return Held(field, expressed(kept), normal, tangential, bounds, room, unknown)
 
 
 def _forces(level: Level, case: Combination, numbers: np.ndarray) -> list[Any]:

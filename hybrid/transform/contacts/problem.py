@@ -15,9 +15,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from hybrid.expression.nodes import Expression
+from hybrid.expression.nodes import Expression, multiply, node
 from hybrid.expression.operations import Absolute
-from hybrid.transform.contacts.linear import dot, solved
+from hybrid.transform.contacts.linear import determinant, dot, solved
 from hybrid.transform.contacts.statuses import IDLE, OPEN, SIGNS, STICKS, Statuses
 
 # What is smaller than this share of its terms is zero: it has been computed with rounding.
@@ -177,6 +177,17 @@ def matrix(level: Level, case: Combination) -> np.ndarray:
     """The matrix of the equations of a case, in numbers."""
     unknowns, _, wanted = _equations(level, case)
     return np.array([[dot(level.delassus[row], column) for column in unknowns] for row, _ in wanted])
+
+
+def solvability(level: Level, case: Combination, numbers: np.ndarray) -> Expression:
+    """How far the equations of a case are from being singular, positive where they have these ``numbers``.
+
+    With friction they may become so: Painleve's paradox begins there. It is 1 without friction at a contact.
+    """
+    unknowns, _, wanted = _equations(level, case)
+    rows = [[dot(level.delassus[row], column) for column in unknowns] for row, _ in wanted]
+    scale = multiply(*(node(level.delassus[row][row]) for row, _ in wanted))
+    return determinant(rows, numbers) / scale
 
 
 def _equations(level: Level, case: Combination) -> tuple[list[list[Any]], list[Any], list[tuple[int, Any]]]:

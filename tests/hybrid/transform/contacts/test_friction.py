@@ -134,6 +134,59 @@ class TestLadder:
         assert turning[0] == pytest.approx(largest / turn, abs=1e-9)
 
 
+class TestSeveralAtOnce:
+    def test_two_contacts_stop_together(self):
+        """A plate between two pads stops, sticks until the pull is twice the friction, and slides back."""
+        system = mechanics(
+            coordinates=("x", "a", "b"),
+            velocities=("u", "va", "vb"),
+            mass=lambda t, x, p: (1.0, 1.0, 1.0),
+            forces=lambda t, x, p: (-3.0 * t, -10.0, -10.0),
+            contacts=[
+                Contact(name, gap=gap, slip=lambda t, x, p: x.u, friction=0.3)
+                for name, gap in (("top", lambda t, x, p: x.a), ("bottom", lambda t, x, p: x.b))
+            ],
+        )
+        arc = simulate(system, (0.0, 0.0, 0.0, 0.5, 0.0, 0.0), (0.0, 4.0))
+        assert arc.status.ok
+        assert arc["u"][-1] == pytest.approx(-6.0, abs=1e-12)
+
+    @pytest.mark.parametrize(
+        ("radius", "begins", "speed"), [(0.1, 5.5 / 6.0, 13.0208333333), (2.0, 2.5, 0.75)]
+    )
+    def test_brake_pads_at_two_radii(self, radius, begins, speed):
+        """The moment of friction is at most the sum of both, each with its own arm."""
+        system = mechanics(
+            coordinates=("th", "a", "b"),
+            velocities=("w", "va", "vb"),
+            mass=lambda t, x, p: (1.0, 1.0, 1.0),
+            forces=lambda t, x, p: (6.0 * t, -10.0, -10.0),
+            contacts=[
+                Contact("near", gap=lambda t, x, p: x.a, slip=lambda t, x, p: x.w, friction=0.5),
+                Contact("far", gap=lambda t, x, p: x.b, slip=lambda t, x, p: radius * x.w, friction=0.5),
+            ],
+        )
+        arc = simulate(system, (0.0,) * 6, (0.0, 3.0))
+        assert arc.jumps[0].t == pytest.approx(begins, abs=1e-12)
+        assert arc["w"][-1] == pytest.approx(speed, abs=1e-9)
+
+    def test_two_feet_that_open_together(self):
+        system = mechanics(
+            coordinates=("y", "phi"),
+            velocities=("v", "w"),
+            mass=lambda t, x, p: (1.0, 0.1),
+            forces=lambda t, x, p: (20.0 * t - G, 0.0),
+            contacts=[
+                Contact(name, gap=lambda t, x, p, s=s: x.y + s * x.phi)
+                for name, s in (("left", -0.1), ("right", 0.1))
+            ],
+        )
+        arc = simulate(system, (0.0, 0.0, 0.0, 0.0), (0.0, 1.0))
+        assert arc.status.ok
+        rise = 1.0 - G / 20.0
+        assert arc["v"][-1] == pytest.approx(10.0 * rise**2, abs=1e-12)
+
+
 class TestPainleve:
     """A rod that slides on its tip: with much friction no acceleration, or several, obey Coulomb's law."""
 
@@ -162,6 +215,16 @@ class TestPainleve:
         arc = simulate(rod(0.3), (*self.start, -5.0, 0.0, 0.0), (0.0, 0.1))
         s, c = np.sin(0.9), np.cos(0.9)
         assert arc["tip.normal"][0] == pytest.approx(G / (1.0 + 3.0 * c * (c - 0.3 * s)), abs=1e-10)
+
+    def test_it_is_reached_in_the_middle_of_a_run(self):
+        """Where ``1 + 3 c^2 - 3 mu s c`` becomes zero, the forces grow beyond all bounds."""
+        start = (0.0, np.sin(0.3), 0.3, -8.0 - 2.5 * np.sin(0.3), 2.5 * np.cos(0.3), 2.5)
+        arc = simulate(rod(2.5), start, (0.0, 2.0))
+        assert arc.status.code == hybrid.StatusCode.TERMINAL
+        assert arc.jumps[-1].transition == "painleve"
+        assert "friction 2.5" in arc.status.message
+        s, c = np.sin(arc.x[-1][2]), np.cos(arc.x[-1][2])
+        assert 1.0 + 3.0 * c * c - 7.5 * s * c == pytest.approx(0.0, abs=1e-5)
 
     def test_several_are_told_and_named(self):
         """A rod that would rise meets neither: it flies, or it digs in."""

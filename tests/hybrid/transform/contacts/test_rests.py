@@ -104,6 +104,25 @@ class TestSystem:
         with pytest.raises(hybrid.ArgumentError, match=r"gap of contact 'floor' is -0\.1"):
             simulate(portable(), (-0.1, 0.0), (0.0, 1.0))
 
+    @pytest.mark.parametrize("gap", [-1e-17, -5e-10, 0.0, 5e-10])
+    def test_a_gap_that_is_closed_up_to_rounding(self, gap):
+        arc = simulate(portable(), (gap, -1.0), (0.0, 0.05))
+        assert len(arc.jumps["floor"]) == 1
+        assert arc["v"][-1] == pytest.approx(0.5 - 0.05 * G, abs=1e-6)
+
+    def test_a_mode_that_holds_an_open_contact(self):
+        with pytest.raises(hybrid.ArgumentError, match="holds it closed"):
+            simulate(portable(), (1.0, 0.0), (0.0, 1.0), mode="floor")
+
+    def test_coefficients_out_of_range(self):
+        with pytest.raises(hybrid.ArgumentError, match="restitution must be between 0 and 1"):
+            simulate(ball(), (1.0, 0.0), (0.0, 1.0), parameters={"e": 1.5})
+
+    @pytest.mark.parametrize("name", ["free", "settles", "a sticks", "a,b", "a+b", ""])
+    def test_names_that_modes_have(self, name):
+        with pytest.raises(hybrid.ModelError, match="Contact: name"):
+            Contact(name, gap=height)
+
     def test_many_runs_and_orbits(self):
         """A ball on a table: the runs of a crew, and an orbit of one impact a period."""
         system = mechanics(
