@@ -8,6 +8,7 @@ import numpy as np
 from hybrid.orbits.rest import EPSILON, Drift
 from hybrid.status import Status, StatusCode
 from hybrid.system.graph import HybridSystem
+from hybrid.system.periodicity import unclosed
 
 # Rounding of the end of an orbit, in units in the last place of its largest states: the largest gap accepted
 # when Newton's method makes no more progress.
@@ -89,7 +90,7 @@ class Shot:
     @property
     def gap(self) -> np.ndarray:
         """Distance ``(n,)`` from the start to the end, without whole turns of angles and without shifts."""
-        gap = self.system.unclosed(self.end - self.point.x)
+        gap = unclosed(self.system, self.end - self.point.x)
         if self.drift is not None:
             gap[self.drift.components] = self.drift.moved
         return gap

@@ -27,6 +27,7 @@ from hybrid.status import Status, StatusCode, noting
 from hybrid.system.entries import are_ageless
 from hybrid.system.graph import HybridSystem
 from hybrid.system.growth import Unexplored, stage_of
+from hybrid.system.periodicity import unclosed
 
 # Points, besides the solver's own, that show how far an orbit moves.
 SAMPLES = 65
@@ -294,7 +295,7 @@ class Shooting:
             return guess.period
         n = self.system.tangent_dimension
         extent = np.ptp(arc.x[:, :n], axis=0)
-        apart = [self.system.unclosed(each) for each in arc(guess.t + times)[:, :n] - guess.x]
+        apart = [unclosed(self.system, each) for each in arc(guess.t + times)[:, :n] - guess.x]
         gaps = [length(each) for each in apart / np.where(extent > 0, extent, 1.0)]
         nearest = int(np.argmin(gaps))
         return float(times[nearest]) if gaps[nearest] < NEARER * gaps[SAMPLES - 1] else guess.period

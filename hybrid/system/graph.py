@@ -36,7 +36,7 @@ from hybrid.system.laws import Laws, placed
 from hybrid.system.members import shared_name
 from hybrid.system.moving import moving_numbers
 from hybrid.system.outputs import Output, as_outputs, check_outputs
-from hybrid.system.periodicity import Period, closed_change, period_at
+from hybrid.system.periodicity import Period, period_at
 from hybrid.system.portable import Portable
 from hybrid.system.repeat import Repeat
 from hybrid.system.switching import switching_inside
@@ -300,12 +300,6 @@ class HybridSystem(Portable):
         found = np.array([name in self.cyclic for name in self.state_names])
         found.flags.writeable = False
         return found
-
-    def unclosed(self, change: np.ndarray) -> np.ndarray:
-        """Changes ``(..., k)`` of the first components, without whole turns and shifts along cyclic ones."""
-        k = change.shape[-1]
-        closed = closed_change(change, self.turn_lengths[:k])
-        return np.where(self.is_cyclic[:k], 0.0, closed) if self.cyclic else closed
 
     @property
     def state_names(self) -> tuple[str, ...]:

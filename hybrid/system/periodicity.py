@@ -118,6 +118,13 @@ def closed_change(change: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     return np.asarray(change - lengths * whole_turns(change, lengths))
 
 
+def unclosed(system: Any, change: np.ndarray) -> np.ndarray:
+    """Changes ``(..., k)`` of the first components, without whole turns and shifts along cyclic ones."""
+    k = change.shape[-1]
+    closed = closed_change(change, system.turn_lengths[:k])
+    return np.where(system.is_cyclic[:k], 0.0, closed) if system.cyclic else closed
+
+
 def _fault(
     variables: Variables, function: ModelFunction, t: float, x: np.ndarray, values: np.ndarray, shift: Shift
 ) -> tuple[float, float] | None:

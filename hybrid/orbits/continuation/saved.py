@@ -17,6 +17,7 @@ from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Taylor
 from hybrid.status import SUCCESS
 from hybrid.system.graph import HybridSystem
+from hybrid.system.periodicity import unclosed
 
 if TYPE_CHECKING:
     import xarray
@@ -118,7 +119,7 @@ def _orbit(
         multipliers=multipliers.real if np.all(multipliers.imag == 0.0) else multipliers,
         log_moduli=moduli,
         fundamental=arc.fundamental,
-        residual=float(np.linalg.norm(system.unclosed(change))),
+        residual=float(np.linalg.norm(unclosed(system, change))),
         iterations=0,
         signature=(mode, *(str(jump.target) for jump in arc.jumps)),
         transitions=tuple(map(str, arc.jumps.transition)),

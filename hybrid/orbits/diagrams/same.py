@@ -18,7 +18,7 @@ from hybrid.orbits.periodic_orbit import periodic_orbit
 from hybrid.simulation.arc import HybridArc
 from hybrid.solvers import Solver
 from hybrid.system.graph import HybridSystem
-from hybrid.system.periodicity import closed_change
+from hybrid.system.periodicity import closed_change, unclosed
 from hybrid.transform.aged import original_of, without_age
 
 # Two orbits are one if their periods and states differ by less, in units of the period and of the orbit.
@@ -127,7 +127,7 @@ def distances(system: HybridSystem, arc: HybridArc, times: np.ndarray, x: np.nda
     system = original_of(system)
     n = system.tangent_dimension
     states, sizes, x = (without_age(system, each)[..., :n] for each in (arc(times), extents(arc), x))
-    return np.asarray((np.abs(system.unclosed(states - x)) / sizes).max(axis=-1))
+    return np.asarray((np.abs(unclosed(system, states - x)) / sizes).max(axis=-1))
 
 
 def extents(arc: HybridArc) -> np.ndarray:

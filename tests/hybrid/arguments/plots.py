@@ -27,6 +27,11 @@ FIGSIZE = [3, "a", (1.0,), (1.0, -2.0), (1.0, np.inf), ("a", "b")]
 
 def plots(made):
     arc, chart = made["arc"], made["chart"]
+    ground = hybrid.Contact("ground", lambda t, x, p: x.q)
+    ball = hybrid.mechanics(
+        coordinates=("q",), velocities=("v",), contacts=[ground], mass=lambda t, x, p: (1.0,)
+    )
+    touching = hybrid.simulate(ball, (1.0, -1.0), (0.0, 2.0))
     return [
         (
             call(hybrid.plot.plot_arc, arc),
@@ -46,6 +51,10 @@ def plots(made):
                 "ax": AXES,
                 "figsize": FIGSIZE,
             },
+        ),
+        (
+            call(hybrid.plot.plot_contacts, touching),
+            {"arc": [None, "a", 3, BALL], "ax": AXES, "figsize": FIGSIZE},
         ),
         (call(hybrid.plot.plot_graph, BALL), {"system": SYSTEM, "ax": AXES, "figsize": FIGSIZE}),
         (call(hybrid.plot.plot, BALL), {"result": [None, "a", 3]}),

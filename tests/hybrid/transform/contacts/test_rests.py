@@ -85,6 +85,7 @@ def portable(**given):
 
 
 class TestSystem:
+    @pytest.mark.as_given
     def test_is_pickled_with_what_it_needs(self):
         system = portable()
         arc = simulate(system, (1.0, 0.0), (0.0, 3.0))
