@@ -214,7 +214,7 @@ def check_impacts(case: Case) -> None:
     --------
     >>> from hybrid import Contact, mechanics
     >>> from hybrid.testing import Case, PropertyError, check_impacts
-    >>> lively = Contact("floor", gap=lambda t, x, p: x.y, restitution=lambda t, x, p: 1.2)
+    >>> lively = Contact("floor", gap=lambda t, x, p: x.y, restitution=lambda t, x, p: 1.2 + x.y)
     >>> ball = mechanics(
     ...     coordinates=("y",),
     ...     velocities=("v",),

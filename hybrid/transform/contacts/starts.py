@@ -9,6 +9,8 @@ import numpy as np
 
 from hybrid.errors import ArgumentError
 from hybrid.expression.evaluation import Program
+from hybrid.expression.graph import mentions
+from hybrid.expression.nodes import Expression
 from hybrid.system.growth import Place
 from hybrid.transform.contacts.statuses import OPEN, Statuses
 from hybrid.transform.contacts.view import Mechanics
@@ -35,8 +37,7 @@ class Starts:
         """
         with np.errstate(all="ignore"):
             values = self._program.run(self.mechanics.space.values(*place))
-        count = len(self.mechanics.contacts)
-        gaps = values[:count]
+        gaps = values[: len(self.mechanics.contacts)]
         for i, (each, gap) in enumerate(zip(self.mechanics.contacts, gaps, strict=True)):
             told = f"x0 = {tuple(map(float, place[1]))}: the gap of contact {each.contact.name!r} is {gap:g}"
             if gap < -self.together:
@@ -48,22 +49,38 @@ class Starts:
                     f"{told}, and the mode that mode= names holds it closed. Start with a gap of zero, or "
                     "leave the mode to the state."
                 )
-            self._check(each.contact.title, *values[count + 3 * i : count + 3 * i + 3])
+        for title, what, value in zip(*self._told, values[len(gaps) :], strict=True):
+            if not 0.0 <= value <= (1.0 if what == "restitution" else np.inf):
+                allowed = "between 0 and 1" if what == "restitution" else "0 or more"
+                raise ArgumentError(f"parameters: {title}: {what} must be {allowed}; it is {value:g}.")
         return any(gap <= self.together for gap in gaps)
 
-    def _check(self, title: str, restitution: float, friction: float, static: float) -> None:
-        if not 0.0 <= restitution <= 1.0:
-            raise ArgumentError(
-                f"parameters: {title}: restitution must be between 0 and 1; it is {restitution:g} here."
-            )
-        if not 0.0 <= friction <= static < np.inf:
-            raise ArgumentError(
-                f"parameters: {title}: friction must not be negative, and not larger than static friction; "
-                f"they are {friction:g} and {static:g} here."
-            )
+    @cached_property
+    def _coefficients(self) -> list[tuple[str, str, Expression]]:
+        """The coefficients that parameters decide: others have a meaning only where contacts are closed.
+
+        Static friction counts as what it is above the kinetic one.
+        """
+        space = self.mechanics.space
+        found = []
+        for each in self.mechanics.contacts:
+            named = {
+                "restitution": each.restitution,
+                "friction": each.friction,
+                "static friction, less the kinetic one,": each.static - each.friction,
+            }
+            found += [
+                (each.contact.title, what, coefficient)
+                for what, coefficient in named.items()
+                if not mentions(coefficient, (space.t, *space.q, *space.u))
+            ]
+        return found
+
+    @property
+    def _told(self) -> tuple[list[str], list[str]]:
+        return [each[0] for each in self._coefficients], [each[1] for each in self._coefficients]
 
     @cached_property
     def _program(self) -> Program:
-        contacts = self.mechanics.contacts
-        coefficients = [each for c in contacts for each in (c.restitution, c.friction, c.static)]
-        return Program([*(each.gap for each in contacts), *coefficients])
+        gaps = [each.gap for each in self.mechanics.contacts]
+        return Program([*gaps, *(each[2] for each in self._coefficients)])
