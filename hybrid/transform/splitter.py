@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import reduce
-from itertools import chain, count, islice, product
-from threading import RLock
+from itertools import islice, product
 from typing import Any, cast
 
 import attrs
@@ -26,12 +25,13 @@ from hybrid.system.derivatives import evaluate, sample_points
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.functions import field_function, moving_field
 from hybrid.system.graph import HybridSystem, watched_by
-from hybrid.system.growth import Growth, Place
+from hybrid.system.growth import Place
 from hybrid.transform import corners, rests
 from hybrid.transform.cells import Cell, Choice, Pieces
 from hybrid.transform.edges import Edge, Outgoing, all_of
 from hybrid.transform.landings import landed, on_side
 from hybrid.transform.naming import Names, copy_name
+from hybrid.transform.stages import Stages, numbered
 from hybrid.transform.ticks import timed
 from hybrid.transform.titles import titles_of
 
@@ -43,14 +43,13 @@ SIZES = (0.1, 1.0, 10.0)
 MOST_WHOLE = 12
 
 
-class Splitter(Growth):
+class Splitter(Stages):
     """Makes the modes and transitions of the split system, cell by cell."""
 
     def __init__(self, system: HybridSystem, modes: Mapping[str, Any] | None = None) -> None:
+        super().__init__()
         self.original, self.called = system, modes
         self.watched = watched_by(system)
-        self.lock = RLock()
-        self.written: dict[Any, Any] = {}
         self.heights: dict[int, Function] = {}
         self.variables = system.variables
         self.symbols = model_symbols(system.dimension, len(system.parameters))
@@ -60,8 +59,6 @@ class Splitter(Growth):
         self.pieces = [self._pieces(i, mode) for i, mode in enumerate(system.modes)]
         self.known: dict[Cell, tuple[Mode, list[Edge]]] = {}
         self.made: dict[Cell, None] = {}
-        self.stage: HybridSystem | None = None
-        self.frontier: dict[str, Cell] = {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _begun, (self.original, self.called)
@@ -85,17 +82,6 @@ class Splitter(Growth):
             yield from self.names.titles.of(
                 cell.sides, lambda number, side: self.names.side(known, number, side)
             )[0]
-
-    @property
-    def current(self) -> HybridSystem:
-        """The system with all modes that have been made so far."""
-        with self.lock:
-            self.stage = self.stage or self._assembled()
-            return self.stage
-
-    def leads_on(self, transition: str) -> bool:
-        """Whether a transition, or the limit of its chatter, leads to a mode that the system lacks."""
-        return transition in self.frontier
 
     def extend(self, transition: str, place: Place, known: Collection[str]) -> bool:
         """Make the mode to which a transition leads; the place does not matter."""
@@ -174,8 +160,7 @@ class Splitter(Growth):
         for cell in self.made:
             for edge in self._leaving(cell):
                 transition = edge.transition
-                names = chain([transition.name], (f"{transition.name} ({k})" for k in count(2)))
-                name = next(each for each in names if each not in used)
+                name = next(each for each in numbered(transition.name) if each not in used)
                 used.add(name)
                 # Names of earlier stages stay: a run in another thread may still be on such a stage.
                 if edge.target is None or edge.target in self.made:

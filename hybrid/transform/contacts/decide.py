@@ -9,9 +9,10 @@ import attrs
 import numpy as np
 
 from hybrid.expression.nodes import ZERO, Expression, node
-from hybrid.expression.operations import Absolute, And, LessEqual
+from hybrid.expression.operations import And, LessEqual
 from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.contacts.events import BREAKS, IMPACT, SETTLES, STOPS, SUDDEN, ContactEvent
+from hybrid.transform.contacts.linear import size_of
 from hybrid.transform.contacts.problem import NOISE, SHARED, Combination, Level, Outcome, outcome
 from hybrid.transform.contacts.solutions import (
     Found,
@@ -234,9 +235,8 @@ class Judge:
         closed, approaching, impulses = parts
         return Decision(closed, approaching, impulses, tuple(resting), tuple(sliding), case)
 
-    def start(self, t: float, x: np.ndarray, parameters: np.ndarray) -> Decision | Undecided:
+    def start(self, view: View) -> Decision | Undecided:
         """What holds at a start; contacts that approach are open, since their impact is still to come."""
-        view = self.mechanics.at(t, x, parameters)
         rows = [self.mechanics.places[i][0] for i in range(len(self.mechanics.contacts))]
         resting = [
             i
@@ -247,9 +247,8 @@ class Judge:
         nothing = ContactEvent(SETTLES), Combination.of([OPEN] * len(rows))
         return self._rest(*nothing, (tuple(resting), (), ()), view, resting, sliding)
 
-    def is_hit(self, t: float, x: np.ndarray, parameters: np.ndarray) -> bool:
+    def is_hit(self, view: View) -> bool:
         """Whether a contact approaches at a start whose gap is negative by rounding."""
-        view = self.mechanics.at(t, x, parameters)
         rows = [normal for normal, _ in self.mechanics.places]
         return any(
             gap < 0.0 and view.speeds[row] < -NOISE * view.fast[row]
@@ -290,7 +289,7 @@ class Judge:
         """
         if self.law == SEQUENTIAL and event.kind == IMPACT:
             return ZERO if isinstance(view.gaps[i], Expression) else False
-        near = _not_larger(_size(view.gaps[i]), self.together)
+        near = _not_larger(size_of(view.gaps[i]), self.together)
         if event.kind != SETTLES:
             return near
         still = self.is_still(view, self.mechanics.places[i][0])
@@ -334,10 +333,6 @@ class Judge:
 def _sign(speed: float, noise: float) -> int:
     """The sign of a speed, 0 for one that is rounding: what counts as one is its ``noise``."""
     return 0 if abs(speed) <= NOISE * noise else 1 if speed > 0 else -1
-
-
-def _size(value: Any) -> Any:
-    return Absolute(value) if isinstance(value, Expression) else abs(value)
 
 
 def _not_larger(value: Any, most: Any) -> Any:

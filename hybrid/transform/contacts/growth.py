@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import cached_property, reduce
-from itertools import chain, count
-from threading import RLock
 from typing import Any
 
 import attrs
@@ -38,6 +36,7 @@ from hybrid.transform.contacts.statuses import (
     statuses_of,
 )
 from hybrid.transform.contacts.view import FORCES, View
+from hybrid.transform.stages import Stages, numbered
 
 SETTLING, BEGINNING = "settles", "begins"
 # A gain of kinetic energy below this share is rounding.
@@ -93,24 +92,20 @@ class Origin:
     called: Mapping[str, Any]
 
 
-class ContactGrowth:
+class ContactGrowth(Stages):
     """Makes the modes of a mechanical system and the transitions between them, as runs need them."""
 
     def __init__(
         self, judge: Judge, original: HybridSystem, origin: Origin, start: str | None = None
     ) -> None:
+        super().__init__()
         self.judge, self.original, self.origin, self.start = judge, original, origin, start
         self.called = origin.called
         self.mechanics = judge.mechanics
-        self.written: dict[Any, Any] = {}
-        self.lock = RLock()
         self.made: dict[Combination, Made] = {}
-        self.stage: HybridSystem | None = None
-        self.frontier: dict[str, Watch] = {}
-        self.told: dict[str, str] = {}
+        self.why: dict[str, str] = {}
         self.notes: dict[str, None] = {}
-        # Transitions of impacts whose order would matter, each with the names of the contacts.
-        self.ambiguous: dict[str, str] = {}
+        self.doubtful: dict[str, str] = {}
         self.starts = Starts(self.mechanics, judge.together)
         self.begins = False
         count = len(self.mechanics.contacts)
@@ -126,7 +121,17 @@ class ContactGrowth:
         )
         sample = self.original.variables
         anywhere = 0.0, np.ones(sample.dimension), sample.defaults
-        self._make(nothing, anywhere)
+        self.free = self._make(nothing, anywhere)
+
+    @property
+    def told(self) -> Mapping[str, str]:
+        """By transition: why a run ends there, in words."""
+        return self.why
+
+    @property
+    def ambiguous(self) -> Mapping[str, str]:
+        """Impacts whose order would matter, each with the names of the contacts."""
+        return self.doubtful
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _made_again, (self.origin.make, self.origin.called)
@@ -136,17 +141,6 @@ class ContactGrowth:
         """What the author gave."""
         return [each.contact for each in self.mechanics.contacts]
 
-    @property
-    def current(self) -> HybridSystem:
-        """The system with all modes that have been made so far."""
-        with self.lock:
-            self.stage = self.stage or self._assembled()
-            return self.stage
-
-    def leads_on(self, transition: str) -> bool:
-        """Whether a transition stands for cases that have not been made."""
-        return transition in self.frontier
-
     def extend(self, transition: str, place: Place, known: Collection[str]) -> bool:
         """Make what happens at the end of a run; False if nothing can: the run ends there."""
         with self.lock:
@@ -154,7 +148,7 @@ class ContactGrowth:
             decision = self._decided(watch, place)
             if isinstance(decision, Undecided):
                 watch.undecided = decision
-                self.told[transition] = self._why(watch, decision, self.mechanics.at(*place))
+                self.why[transition] = self._why(watch, decision, self.mechanics.at(*place))
                 ends = self._frontier_name(watch, decision.name) in known
                 self.stage = self.stage if ends else None
                 return not ends
@@ -163,7 +157,7 @@ class ContactGrowth:
                 if made.name not in known:
                     return True
                 # It holds in numbers and not in the compiled code: all depends on rounding.
-                self.told[transition] = "What happens there depends on rounding."
+                self.why[transition] = "What happens there depends on rounding."
                 return False
             for each in self._alike(watch, decision):
                 if decision not in each.decisions:
@@ -187,7 +181,7 @@ class ContactGrowth:
         view = self.mechanics.at(*place)
         if self.judge.law != SEQUENTIAL and order_matters(self.mechanics, view, decision.closed):
             for each in self._alike(watch, decision):
-                self.ambiguous[each.cases[-1][0].name] = ", ".join(map(repr, names))
+                self.doubtful[each.cases[-1][0].name] = ", ".join(map(repr, names))
         before, after = (self._energy(x, place) for x in (place[1], self._after(transition, place)))
         if after - before > GAIN * before:
             self.notes[
@@ -277,19 +271,20 @@ class ContactGrowth:
             statuses = known[mode].statuses if mode in known else statuses_of(self.contacts, mode)
         closes = self.starts.closes(place, statuses)
         if statuses is None:
-            return self._closed_start(place) if closes else next(iter(known))
+            return self._closed_start(place) if closes else self.free.mode.name
         if mode is not None and mode in known:
             return mode
         return self._make(self.judge.named(statuses, *place), place).mode.name
 
     def _closed_start(self, place: Place) -> str:
         """The mode of a start at which gaps are closed."""
-        if self.judge.is_hit(*place):
+        view = self.mechanics.at(*place)
+        if self.judge.is_hit(view):
             # A gap that is negative by rounding is not seen to close: the impact is at the start.
             self.stage = self.stage if self.begins else None
             self.begins = True
             return BEGINNING
-        decision = self.judge.start(*place)
+        decision = self.judge.start(view)
         if isinstance(decision, Undecided):
             if decision.name == SEVERAL_CASES:
                 raise ArgumentError(
@@ -304,9 +299,7 @@ class ContactGrowth:
         if now not in self.made:
             name = mode_name(self.contacts, now.statuses)
             taken = {each.mode.name for each in self.made.values()}
-            name = next(
-                each for each in chain([name], (f"{name} ({k})" for k in count(2))) if each not in taken
-            )
+            name = next(each for each in numbered(name) if each not in taken)
             forces = held(self.mechanics, now, place)
             mode = Mode(name, forces.field, holds=forces.holds)
             self.made[now] = Made(mode, forces, [*self._watches(name, now, forces)])
@@ -375,7 +368,7 @@ class ContactGrowth:
 
     def _unused(self, name: str) -> str:
         used = {each.name for watch in self._all_watches() for each, _ in watch.cases}
-        return next(each for each in chain([name], (f"{name} ({k})" for k in count(2))) if each not in used)
+        return next(each for each in numbered(name) if each not in used)
 
     def _all_watches(self) -> Iterator[Watch]:
         yield self.settling
@@ -393,16 +386,20 @@ class ContactGrowth:
             if onward is not None:
                 transitions.append(onward)
         modes = [each.mode for each in self.made.values()]
-        field = next(iter(self.made.values())).mode.field
-        moments = [SETTLING, BEGINNING] if self.begins else [SETTLING]
+        moments = [Mode(name, self.free.mode.field) for name in self._moments]
         given: dict[str, Any] = {
-            "modes": [*modes, *(Mode(name, field) for name in moments)],
+            "modes": [*modes, *moments],
             "transitions": transitions,
             "outputs": {**self.original.outputs, **self._outputs()},
             "notes": (*self.original.notes, *self.notes),
             "growth": self,
         }
         return attrs.evolve(self.original, **given)
+
+    @property
+    def _moments(self) -> list[str]:
+        """The modes that last no time."""
+        return [SETTLING, BEGINNING] if self.begins else [SETTLING]
 
     def _frontier(self, watch: Watch) -> Transition | None:
         """The transition that ends a run where none of the cases that have been made holds."""
@@ -417,16 +414,13 @@ class ContactGrowth:
     def _frontier_name(self, watch: Watch, part: str) -> str:
         """A name that stays: a run in another thread may still be on an earlier stage."""
         first = part if watch.undecided is not None else f"{watch.source}: {part}"
-        for name in chain([first], (f"{first} ({k})" for k in count(2))):
-            if self.frontier.setdefault(name, watch) is watch:
-                return name
-        raise AssertionError("names do not end")
+        return next(each for each in numbered(first) if self.frontier.setdefault(each, watch) is watch)
 
     def _outputs(self) -> dict[str, Output]:
         """Gap and forces of each contact, in the modes that have been made."""
         found = {}
         modes = [(each.mode.name, each.forces) for each in self.made.values()]
-        modes += [(name, modes[0][1]) for name in ([SETTLING, BEGINNING] if self.begins else [SETTLING])]
+        modes += [(name, self.free.forces) for name in self._moments]
         for i, contact in enumerate(self.contacts):
             for what in FORCES if contact.has_friction else FORCES[:1]:
                 name = f"{contact.name}.{what}"

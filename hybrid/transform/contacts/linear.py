@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.expression.nodes import ZERO, Expression, add, multiply, node
+from hybrid.expression.operations import Absolute
 
 Vector = list[Expression]
 
@@ -18,6 +19,11 @@ def dot(a: Sequence[Any], b: Sequence[Any]) -> Any:
     if any(isinstance(each, Expression) for each in terms):
         return add(*map(node, terms))
     return sum(terms[1:], terms[0]) if terms else 0.0
+
+
+def size_of(value: Any) -> Any:
+    """The size of a number, or of an expression."""
+    return Absolute(value) if isinstance(value, Expression) else abs(value)
 
 
 def solved(

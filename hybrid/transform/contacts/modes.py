@@ -19,6 +19,7 @@ from hybrid.transform.contacts.problem import (
     Combination,
     Level,
     bound,
+    correlations,
     matrix,
     outcome,
     solvability,
@@ -78,7 +79,8 @@ def held(
         return Held(expressed([*space.u, *map(node, view.free)]), None, normal, tangential, [])
     case = now.of_closed(closed)
     exact, rows = mechanics.forces(view, closed), mechanics.rows_of(closed)
-    numbers = matrix(mechanics.forces(mechanics.at(*place), closed), case)
+    there = mechanics.at(*place)
+    numbers = matrix(mechanics.forces(there, closed), case)
     pace = _pace(space, view.moved(_forces(exact, case, numbers), rows, view.free), place)
     level = attrs.evolve(
         exact,
@@ -92,7 +94,7 @@ def held(
             tangential[i] = node(forces[level.across(k)])
         if case.sticks(k):
             bounds[i] = node(bound(level, case, k, forces))
-    unknown = _undetermined(mechanics, now, mechanics.at(*place))
+    unknown = _undetermined(mechanics, now, there)
     field = expressed([*space.u, *map(node, view.moved(forces, rows, view.free))])
     kept = [each for i in closed for each in (view.gaps[i], view.speeds[mechanics.places[i][0]])]
     kept += [
@@ -150,9 +152,7 @@ def _undetermined(mechanics: Mechanics, now: Combination, view: View) -> frozens
             if status != OPEN and row is not None and (row == normal or status == STICKS):
                 directions.append((i, what))
                 rows.append(row)
-    G = np.array([[view.delassus[i][j] for j in rows] for i in rows], dtype=float)
-    sizes = np.sqrt(np.diag(G))
-    values, vectors = np.linalg.eigh(G / np.outer(sizes, sizes))
+    values, vectors = np.linalg.eigh(correlations(view.delassus, rows))
     free = np.abs(vectors[:, values <= DEPENDENT])
     return frozenset(
         each for each, share in zip(directions, free, strict=True) if share.max(initial=0.0) > STEP

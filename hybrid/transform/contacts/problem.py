@@ -16,8 +16,7 @@ import attrs
 import numpy as np
 
 from hybrid.expression.nodes import Expression, multiply, node
-from hybrid.expression.operations import Absolute
-from hybrid.transform.contacts.linear import determinant, dot, solved
+from hybrid.transform.contacts.linear import determinant, dot, size_of, solved
 from hybrid.transform.contacts.statuses import IDLE, OPEN, SIGNS, STICKS, Statuses
 
 # What is smaller than this share of its terms is zero: it has been computed with rounding.
@@ -256,6 +255,13 @@ def _conditions(
             yield SIGNS[status] * after[level.across(i)], level.noise[level.across(i)]
 
 
+def correlations(delassus: Sequence[Sequence[Any]], rows: Sequence[int]) -> np.ndarray:
+    """How far directions act on each other, in numbers, each in its own unit: 1 on the diagonal."""
+    G = np.array([[delassus[i][j] for j in rows] for i in rows], dtype=float)
+    sizes = np.sqrt(np.diag(G))
+    return np.asarray(G / np.outer(sizes, sizes))
+
+
 def bound(level: Level, case: Combination, i: int, forces: Sequence[Any]) -> Any:
     """The largest friction of a contact that sticks, with that of the contacts whose friction it takes up.
 
@@ -266,8 +272,7 @@ def bound(level: Level, case: Combination, i: int, forces: Sequence[Any]) -> Any
     for j, by in enumerate(case.merged):
         if by == i:
             entry = level.delassus[own][level.across(j)]
-            size = Absolute(entry) if isinstance(entry, Expression) else abs(entry)
-            most = most + level.static[j] * forces[level.row(j)] * size / level.delassus[own][own]
+            most = most + level.static[j] * forces[level.row(j)] * size_of(entry) / level.delassus[own][own]
     return most
 
 

@@ -8,7 +8,15 @@ from itertools import combinations, product
 import attrs
 import numpy as np
 
-from hybrid.transform.contacts.problem import DEPENDENT, Combination, Level, Outcome, holds, outcome
+from hybrid.transform.contacts.problem import (
+    DEPENDENT,
+    Combination,
+    Level,
+    Outcome,
+    correlations,
+    holds,
+    outcome,
+)
 from hybrid.transform.contacts.statuses import HELD, IDLE, OPEN, SIGNS, STICKS, Statuses
 
 # Solutions whose speeds differ by more than this share of their terms are several.
@@ -88,9 +96,7 @@ def _rank(level: Level, rows: Sequence[int]) -> int:
     """How many directions of rows do not depend on each other."""
     if not rows:
         return 0
-    G = np.array([[level.delassus[i][j] for j in rows] for i in rows], dtype=float)
-    sizes = np.sqrt(np.diag(G))
-    values = np.linalg.eigvalsh(G / np.outer(sizes, sizes))
+    values = np.linalg.eigvalsh(correlations(level.delassus, rows))
     return int(np.count_nonzero(values > DEPENDENT))
 
 

@@ -49,7 +49,7 @@ class Starts:
                     f"{told}, and the mode that mode= names holds it closed. Start with a gap of zero, or "
                     "leave the mode to the state."
                 )
-        for title, what, value in zip(*self._told, values[len(gaps) :], strict=True):
+        for (title, what, _), value in zip(self._coefficients, values[len(gaps) :], strict=True):
             if not 0.0 <= value <= (1.0 if what == "restitution" else np.inf):
                 allowed = "between 0 and 1" if what == "restitution" else "0 or more"
                 raise ArgumentError(f"parameters: {title}: {what} must be {allowed}; it is {value:g}.")
@@ -75,10 +75,6 @@ class Starts:
                 if not mentions(coefficient, (space.t, *space.q, *space.u))
             ]
         return found
-
-    @property
-    def _told(self) -> tuple[list[str], list[str]]:
-        return [each[0] for each in self._coefficients], [each[1] for each in self._coefficients]
 
     @cached_property
     def _program(self) -> Program:

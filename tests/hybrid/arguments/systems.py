@@ -38,6 +38,7 @@ CYCLIC = [None, "q", 3, True, (3,), ("nope",), [["q"]], Odd()]
 MEMORY = [None, "u", 1, True, ("1u",), ("u", "u"), (1,), {"u"}, [["u"]], Odd()]
 
 
+PARAMETERS = [[1], "a", 3, {"e": "1"}, {"e": math.nan}, {"e": True}, {"1": 1.0}, {3: 1.0}]
 # Coefficients of contacts.
 COEFFICIENT = [None, -0.1, 2.0, True, math.nan, math.inf, "", [0.5], Odd()]
 
@@ -67,7 +68,7 @@ def systems():
             {
                 "field": [None, *FUNCTION],
                 "state": [*BAD_STATES, {"q", "v"}, Odd()],
-                "parameters": [[1], "a", 3, {"e": "1"}, {"e": math.nan}, {"e": True}, {"1": 1.0}, {3: 1.0}],
+                "parameters": PARAMETERS,
                 "period": [*LIMIT[1:], math.inf],
                 "name": TEXT,
                 "units": UNITS,
@@ -90,7 +91,7 @@ def systems():
             ),
             {
                 "state": [None, "qv", 0, -1, 1.5, True, (), ("1q",), (1, 2), {"q", "v"}, math.nan, Odd()],
-                "parameters": [[1], "a", 3, {"e": "1"}, {"e": math.nan}, {"e": True}, {"1": 1.0}, {3: 1.0}],
+                "parameters": PARAMETERS,
                 "below": [None, *FUNCTION],
                 "above": [None, *FUNCTION],
                 "switching": [None, *FUNCTION],
@@ -125,17 +126,7 @@ def systems():
                     [["q"]],
                     Odd(),
                 ],
-                "parameters": [
-                    [1],
-                    "a",
-                    3,
-                    {"e": "1"},
-                    {"e": math.nan},
-                    {"e": True},
-                    {"1": 1.0},
-                    {3: 1.0},
-                    {"e": 1j},
-                ],
+                "parameters": [*PARAMETERS, {"e": 1j}],
                 "held": MEMORY,
                 "counters": MEMORY,
                 "modes": [*LIST, [], [1], ["a"]],
@@ -216,7 +207,7 @@ def systems():
             {
                 "coordinates": [None, 3, (), ("1q",), (1,), ("q", "r"), Odd()],
                 "velocities": [None, 3, (), ("1q",), (1,), Odd()],
-                "parameters": [[1], "a", 3, {"e": "1"}, {"e": math.nan}, {"e": True}, {"1": 1.0}, {3: 1.0}],
+                "parameters": PARAMETERS,
                 "contacts": [*LIST, [], [1], ["a"]],
                 "mass": [None, *FUNCTION, lambda t, x, p: (1.0, 2.0), lambda t, x, p: (-1.0,)],
                 "forces": [*FUNCTION, lambda t, x, p: (1.0, 2.0)],
