@@ -15,8 +15,8 @@ from hybrid.system.growth import Place
 from hybrid.transform.contacts.statuses import OPEN, Statuses
 from hybrid.transform.contacts.view import Mechanics
 
-# A start in a mode that holds a contact may have a gap of so many times that which counts as closed: the
-# contact is drawn back, and a run by a coarse solver goes on from its end.
+# A start in a mode that holds a contact may have a gap, of either sign, of so many times that which counts as
+# closed: the contact is drawn back, and a run by a coarse solver goes on from its end.
 MOST_OPEN = 1e5
 
 
@@ -40,11 +40,13 @@ class Starts:
         gaps = values[: len(self.mechanics.contacts)]
         for i, (each, gap) in enumerate(zip(self.mechanics.contacts, gaps, strict=True)):
             told = f"x0 = {tuple(map(float, place[1]))}: the gap of contact {each.contact.name!r} is {gap:g}"
-            if gap < -self.together:
+            held = statuses is not None and statuses[i] != OPEN
+            most = MOST_OPEN * self.together if held else self.together
+            if gap < -most:
                 raise ArgumentError(
                     f"{told}, and bodies cannot overlap. Start with a gap that is not negative."
                 )
-            if statuses is not None and statuses[i] != OPEN and gap > MOST_OPEN * self.together:
+            if held and gap > most:
                 raise ArgumentError(
                     f"{told}, and the mode that mode= names holds it closed. Start with a gap of zero, or "
                     "leave the mode to the state."
