@@ -104,6 +104,8 @@ def route_of(system: HybridSystem, arc: HybridArc, period: float) -> tuple[Route
         stretches.append(Stretch(str(group[-1].target), after[0].source, passed, names, counters))
     x = np.array([group[-1].x_plus[:n] for group in groups])
     times = np.array([group[0].t for group in groups] + [groups[0][0].t + period])
+    # Where the order has been turned, the groups before the first one are those of the next period.
+    times[:-1] += np.where(times[:-1] < times[0], period, 0.0)
     return tuple(stretches), x, times
 
 
@@ -151,12 +153,13 @@ def _without_chatter(groups: list[list[Jump]]) -> tuple[list[list[Jump]], list[t
 
 
 def _accumulating(groups: list[list[Jump]]) -> tuple[str, ...]:
-    """Names of the transitions that fire in turn before the last limit."""
-    (limit,) = groups[-1]
+    """Names of the transitions that fire in turn before the last limit, and of those that follow at once."""
+    limit, *at_once = groups[-1]
     names: list[str] = []
-    for group in groups[-2::-1]:
-        for jump in group[::-1]:
-            if names and jump.transition == names[0]:
-                return tuple(names)
-            names.append(jump.transition)
-    return tuple(dict.fromkeys([limit.transition, *names]))
+    for jump in (jump for group in groups[-2::-1] for jump in group[::-1]):
+        if names and jump.transition == names[0]:
+            break
+        names.append(jump.transition)
+    else:
+        names.insert(0, limit.transition)
+    return tuple(dict.fromkeys([*names, *(jump.transition for jump in at_once)]))
