@@ -20,6 +20,7 @@ from hybrid.orbits.rest import EPSILON, drift
 from hybrid.orbits.waits import waits_change
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.ending import status_of
+from hybrid.simulation.holding import drawn_back
 from hybrid.simulation.simulate import simulate
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
@@ -135,9 +136,10 @@ class Shooting:
 
     def _trajectory(self, point: Point, mode: str | None) -> Trajectory:
         """A run from a point that carries the columns of the identity."""
+        known = self.system.parameter_values(self.parameters)
         trajectory = start(
             self.system,
-            self.whole(point),
+            drawn_back(self.system, mode, point.t, self.whole(point), known),
             point.t,
             mode=mode,
             parameters=self.parameters,

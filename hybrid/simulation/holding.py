@@ -1,4 +1,4 @@
-"""Tangent vectors in a mode that holds quantities at zero: none of them leads off."""
+"""Tangent vectors and states in a mode that holds quantities at zero: none of them leads off."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ import numpy as np
 
 from hybrid.system.derivatives import evaluate
 from hybrid.system.elements import Mode
+from hybrid.system.graph import HybridSystem
 from hybrid.system.variables import Variables
 
 # Gradients that are smaller than this share of the largest, in units of their own length, depend on others.
 DEPENDENT = 1e-10
 STEP = float(np.finfo(float).eps) ** (1 / 3)
+# Newton's steps back onto what a mode holds: from nearby a few are enough.
+MOST_STEPS = 6
 
 
 def tangent_projection(
@@ -18,13 +21,47 @@ def tangent_projection(
 ) -> np.ndarray:
     """The projection ``(n, n)`` onto the directions along which all that a mode holds stays zero.
 
-    ``n`` is the number of components with tangent vectors.
+    ``n`` is the number of components with tangent vectors. Held components, and parameters that count as
+    such, stay as they are: the others follow what the mode holds.
     """
     gradients = _gradients(mode, variables, t, x, parameters)
-    sizes = np.linalg.norm(gradients, axis=1)
-    _, values, rows = np.linalg.svd(gradients[sizes > 0.0] / sizes[sizes > 0.0, None])
-    across = rows[: np.count_nonzero(values > DEPENDENT)]
-    return np.asarray(np.eye(gradients.shape[1]) - across.T @ across)
+    projection = np.eye(gradients.shape[1])
+    projection[: variables.moving] -= _back(gradients, variables.moving) @ gradients
+    return projection
+
+
+def drawn_back(
+    system: HybridSystem, mode: str | None, t: float, x: np.ndarray, parameters: np.ndarray
+) -> np.ndarray:
+    """The state ``(n,)`` nearby at which all that a mode holds is zero; ``x`` itself if it holds nothing.
+
+    A run would come there by itself, but only at the pace of the motion, while `tangent_projection` says
+    that it forgets at once how far it has been. Iterates of Newton's method, which leave a curved surface,
+    are drawn back so that their runs do what their tangent vectors say.
+    """
+    held = None if mode is None else system.modes[system.mode_index(mode)]
+    if held is None or held.holds is None:
+        return x
+    variables, found, before = system.variables, x, np.inf
+    for _ in range(MOST_STEPS):
+        off = evaluate(variables, held.holds, t, found, parameters)
+        if off is None:
+            return x
+        step = _back(_gradients(held, variables, t, found, parameters), variables.moving) @ off
+        length = float(np.abs(step).max())
+        if length >= before or length == 0.0:
+            break
+        found, before = found.copy(), length
+        found[: variables.moving] -= step
+    return found
+
+
+def _back(gradients: np.ndarray, moving: int) -> np.ndarray:
+    """The shortest changes ``(moving, h)`` of the state that take one unit of each held quantity away."""
+    rows = gradients[:, :moving]
+    sizes = np.linalg.norm(rows, axis=1)
+    units = np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
+    return np.asarray(np.linalg.pinv(rows * units[:, None], rcond=DEPENDENT) * units)
 
 
 def _gradients(

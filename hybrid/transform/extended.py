@@ -15,6 +15,7 @@ from hybrid.system.clocks import Clock, DerivedClock, numbers_of
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeField, WholeReset
 from hybrid.system.graph import HybridSystem, watched_below
+from hybrid.system.growth import finished
 from hybrid.system.laws import Laws
 from hybrid.system.moving import moving_numbers
 from hybrid.system.portable import made_by
@@ -67,7 +68,7 @@ class _Extension:
             outputs={},
             laws=Laws(),
             notes=(),
-            growth=None,
+            growth=finished(original).growth,
             derived_from=watched_below(original),
         )
 
@@ -75,7 +76,8 @@ class _Extension:
         rates = self._function(mode.field)
         if isinstance(self.original.state, int):
             rates = WholeField(rates, len(self.names))
-        return attrs.evolve(mode, field=rates, jacobian=None)
+        holds = None if mode.holds is None else self._function(mode.holds)
+        return attrs.evolve(mode, field=rates, jacobian=None, holds=holds)
 
     def _transition(self, transition: Transition) -> Transition:
         guard, reset, first, last = transition.guard, transition.reset, self.first, self.last

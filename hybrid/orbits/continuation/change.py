@@ -27,6 +27,7 @@ from hybrid.orbits.continuation.place import (
 )
 from hybrid.orbits.continuation.route import Route, rotations
 from hybrid.orbits.continuation.seams import is_same_motion
+from hybrid.simulation.holding import drawn_back
 from hybrid.simulation.simulate import simulate
 
 # The change is enclosed by so many halvings of a step, each time before it is asked what changes.
@@ -350,7 +351,7 @@ def _asked(near: Place, place: Place, key: Key, farther: float) -> Iterator[Aske
     for t, x, values, period in _around(near, place, j, share, farther):
         arc = simulate(
             family.system,
-            x,
+            drawn_back(family.system, mode, t, x, family.vector(values)),
             (t, t + period),
             mode=mode,
             parameters=family.all_parameters(values),

@@ -16,6 +16,7 @@ from hybrid.orbits.continuation.flow import Flow, Landing
 from hybrid.orbits.continuation.passing import CLOSED, Pass
 from hybrid.orbits.continuation.route import Loop, Route, Stretch
 from hybrid.orbits.held import Held
+from hybrid.simulation.holding import drawn_back
 from hybrid.simulation.repeated import Repeated
 from hybrid.solvers import Solver
 from hybrid.system.functions import field_function, guard_function, reset_function
@@ -226,6 +227,7 @@ class Family:
         """The motion of a stretch; ArithmeticError if it does not end in so many steps or jumps."""
         n, state = len(x), self.extended_state(np.append(x, stretch.counters), values)
         mode = self.extended.mode_index(stretch.mode)
+        state = drawn_back(self.extended, stretch.mode, begin, state, self._others)
         if no_time(begin, end):
             first_rate = self._rate(mode, begin, state)
             last_rate = self._rate(self.extended.mode_index(stretch.end_mode), end, state)
