@@ -7,6 +7,7 @@ from models.boost_converter import boost_converter
 from models.bouncing_ball import bouncing_ball
 from models.bouncing_table import bouncing_table
 from models.buck_converter import buck_converter
+from models.cam_follower import cam_follower
 from models.chua_circuit import chua_circuit
 from models.coulomb_stick_slip import coulomb_stick_slip
 from models.delayed_neurons import delayed_neurons
@@ -25,12 +26,14 @@ from models.rimless_wheel import rimless_wheel
 from models.rocking_block import rocking_block
 from models.sampled_loop import sampled_loop
 from models.simplest_walker import simplest_walker
+from models.slider_crank import slider_crank
 from models.slip_hopper import slip_hopper
 from models.solvable_oscillator import solvable_oscillator
 from models.stick_slip import stick_slip
 from models.stop_oscillator import stop_oscillator
 from models.switched_arrival import switched_arrival
 from models.three_disk_billiard import three_disk_billiard
+from models.verge_escapement import verge_escapement
 from models.vibroimpact import vibroimpact
 
 __all__ = [
@@ -41,6 +44,7 @@ __all__ = [
     "bouncing_ball",
     "bouncing_table",
     "buck_converter",
+    "cam_follower",
     "chua_circuit",
     "coulomb_stick_slip",
     "delayed_neurons",
@@ -59,11 +63,13 @@ __all__ = [
     "rocking_block",
     "sampled_loop",
     "simplest_walker",
+    "slider_crank",
     "slip_hopper",
     "solvable_oscillator",
     "stick_slip",
     "stop_oscillator",
     "switched_arrival",
     "three_disk_billiard",
+    "verge_escapement",
     "vibroimpact",
 ]

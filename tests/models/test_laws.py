@@ -10,13 +10,15 @@ import models
 from hybrid import Guard, Laws, Reset
 from hybrid.system.graph import laws_of
 from hybrid.testing import Case, PropertyError, check_laws, check_system
+from hybrid.testing.contacts import IMPACTS
 from hybrid.testing.crossings import CROSSINGS
 from hybrid.testing.dimensions import DIMENSIONS
 from hybrid.testing.events import SIDES
 from hybrid.testing.invariance import CUT, ELASTIC
 from hybrid.testing.laws import law_checks
-from hybrid.testing.saltation import CONTINUITY, EXTENSION, FLOW_DIRECTION, SUM_RULE
+from hybrid.testing.saltation import CONTINUITY, EXTENSION, FLOW_DIRECTION, SALTATION, SUM_RULE
 from models.contact import HuntCrossley, KelvinVoigt, Rigid
+from models.slider_crank import CORNERS
 
 # The models, and ranges in which they are meant to run.
 RUNS = {
@@ -50,6 +52,14 @@ RUNS = {
                 each: models.buck_converter().parameters[each] for each in ("V_L", "V_U", "V_ref")
             },
             "t_span": (0.0, 2e-3),
+        },
+    ),
+    "cam_follower": (
+        models.cam_follower(),
+        {
+            "states": {"q": (0.02, 0.06), "v": (-1.0, 1.0)},
+            "parameters": {"w": (38.0, 50.0), "e": (0.1, 0.4)},
+            "t_span": (0.0, 0.4),
         },
     ),
     "chua_circuit": (
@@ -148,6 +158,22 @@ RUNS = {
             "t_span": (0.0, 6.0),
         },
     ),
+    "slider_crank": (
+        models.slider_crank(),
+        {
+            "examples": 5,
+            "states": {
+                "theta1": (-0.003, 0.003),
+                "theta2": (-0.001, 0.001),
+                "theta3": (-0.005, 0.005),
+                "w1": (140.0, 160.0),
+                "w2": (-80.0, -70.0),
+                "w3": (-5.0, 5.0),
+            },
+            "parameters": {"mu": (0.0, 0.02)},
+            "t_span": (0.0, 0.006),
+        },
+    ),
     "slip_hopper": (
         models.slip_hopper(),
         {
@@ -171,6 +197,14 @@ RUNS = {
             "states": {"x": (-0.2, 0.2), "y": (-0.2, 0.2)},
             "parameters": {"R": (1.8, 1.95)},
             "t_span": (0.0, 2.0),
+        },
+    ),
+    "verge_escapement": (
+        models.verge_escapement(),
+        {
+            "states": {"theta": (-0.1, 0.1), "phi": (-0.2, 0.2), "w": (-2.0, 2.0), "nu": (-1.0, 1.0)},
+            "parameters": {"A": (0.28, 0.32), "e": (0.2, 0.6)},
+            "t_span": (0.0, 0.8),
         },
     ),
     "vibroimpact": (
@@ -200,11 +234,15 @@ MORE_UNCHECKED = {
     "refractory_neuron": {DIMENSIONS},
     "digital_pwm": {CROSSINGS, CUT, DIMENSIONS, SUM_RULE},
     "interleaved_converter": {CUT},
+    "cam_follower": {FLOW_DIRECTION},
+    # Few runs, since each start in contact has modes of its own; its own tests check impacts.
+    "slider_crank": {IMPACTS, SALTATION},
 }
 # Few starts lead to these; a belt carries a block away from where it would slip ahead.
 RARE = {
     "dry_friction_oscillator": {"two-fold", "sliding->above"},
     "stick_slip": {"two-fold", "sliding->above"},
+    "slider_crank": {f"impacts of contact '{corner}'" for corner in CORNERS},
 }
 
 
