@@ -99,6 +99,22 @@ def test_a_branch_on_the_cam_ends_at_the_critical_speed(c):
     assert lift.value == pytest.approx(critical_speed({"c": c}), rel=1e-10)
 
 
+def test_the_branch_goes_on_with_bounces():
+    """Beyond the critical speed the follower lifts off, bounces and comes to rest in each turn."""
+    system, least = cam_follower(), critical_speed()
+    # This run makes the modes that the branch comes to.
+    simulate(system, {"q": 0.03, "v": 0.0}, (0.0, 1.0), parameters={"w": 1.05 * least})
+    orbit = periodic_orbit(system, on_the_cam(25.0), mode="cam", parameters={"w": 25.0})
+    branch = continue_orbit(orbit, "w", (20.0, 1.1 * least))
+    assert branch.status.ok
+    [lift] = branch.bifurcations
+    assert (lift.kind, lift.value) == ("grazing", pytest.approx(least, rel=1e-10))
+    assert branch.parameter[[0, -1]] == pytest.approx([20.0, 1.1 * least])
+    fast, slow = branch.orbit(-1).arc(), branch.orbit(0).arc()
+    assert len(fast.jumps["cam opens"]) == 1
+    assert len(slow.jumps) == 0
+
+
 def test_an_orbit_with_one_impact_per_turn():
     w = 60.0
     orbit, turn = one_impact_orbit(w), Map(60.0)

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import hybrid
-from hybrid import periodic_orbit, simulate
+from hybrid import continue_orbit, periodic_orbit, simulate
 from models import verge_escapement
 
 N = 15
@@ -174,6 +174,14 @@ def test_the_pace_is_the_root_of_the_torque_over_the_inertia(orbit):
     assert slower.period == pytest.approx(orbit.period * 3, rel=1e-9)
     expected = np.sort(np.abs(orbit.multipliers))
     np.testing.assert_allclose(np.sort(np.abs(faster.multipliers)), expected, atol=1e-7)
+
+
+def test_a_branch_over_the_torque(orbit):
+    branch = continue_orbit(orbit, "tau", (0.5 * TAU, 2.0 * TAU))
+    assert branch.status.ok
+    np.testing.assert_allclose(branch.period, orbit.period * np.sqrt(TAU / branch.parameter), rtol=1e-8)
+    assert branch.parameter[[0, -1]] == pytest.approx([0.5 * TAU, 2.0 * TAU])
+    assert len(branch.bifurcations) == 0
 
 
 def test_impacts_take_the_work_of_the_torque(orbit):

@@ -25,7 +25,7 @@ from hybrid.orbits.continuation.place import (
     slides,
     start_of,
 )
-from hybrid.orbits.continuation.route import Route, rotations
+from hybrid.orbits.continuation.route import Route, from_limits, rotations
 from hybrid.orbits.continuation.seams import is_same_motion
 from hybrid.simulation.holding import drawn_back
 from hybrid.simulation.simulate import simulate
@@ -348,6 +348,7 @@ def _asked(near: Place, place: Place, key: Key, farther: float) -> Iterator[Aske
     turned = [i for i in ends if i >= j] + [i for i in ends if i < j]
     old = [family.route[i].fired for i in turned]
     starting = {each.name for each in family.system.transitions if each.guard.at_start}
+    starting -= from_limits(family.system)
     for t, x, values, period in _around(near, place, j, share, farther):
         arc = simulate(
             family.system,

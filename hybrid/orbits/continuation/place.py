@@ -14,7 +14,7 @@ from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.family import ROUNDING, Family
 from hybrid.orbits.continuation.parts import divided, growth, holding
 from hybrid.orbits.continuation.passing import CLOSED, Pass
-from hybrid.orbits.continuation.route import LARGEST_GROWTH, Loop, route_of
+from hybrid.orbits.continuation.route import LARGEST_GROWTH, Loop, from_limits, route_of, with_effect
 from hybrid.orbits.held import conserved_at
 from hybrid.orbits.zeros import SHARES, at_zero, interpolated, zero_on_the_way
 from hybrid.simulation.arc import HybridArc
@@ -394,18 +394,22 @@ def _goes(orbit: Pass, first: int, last: int) -> bool:
     begin, x = moment(orbit, first, share)
     end, _ = moment(orbit, last % count, share)
     end += last // count * loop.period
-    arc = simulate(
-        family.system,
-        x,
-        (begin, end),
-        mode=route[first].mode,
-        parameters=family.all_parameters(loop.values),
-        solver=family.solver,
-    )
-    passed = {name for stretch in route for name in stretch.within}
+    try:
+        arc = simulate(
+            family.system,
+            x,
+            (begin, end),
+            mode=route[first].mode,
+            parameters=family.all_parameters(loop.values),
+            solver=family.solver,
+        )
+    except ArgumentError:
+        # The model has no such parameters, such as a restitution below zero.
+        return False
+    passed = from_limits(family.system).union(*(stretch.within for stretch in route))
     jumps = [
         _Event(float(jump.t), (jump.transition,), jump.target)
-        for jump in arc.jumps
+        for jump in with_effect(family.system, arc.jumps)
         if jump.transition not in passed
     ]
     wanted = [
@@ -448,8 +452,9 @@ def _instants(events: list[_Event], least: float) -> list[list[_Event]]:
 def _same(made: list[_Event], wanted: list[_Event]) -> bool:
     """Whether the jumps of an instant are those wanted.
 
-    Events that meet there may come in any order, then by as many other transitions to the same mode.
+    Events that meet there may come in any order, then by as many other transitions to the same mode. One that
+    rounding has undone, as where a contact opens, is made again.
     """
-    names = [[name for event in events for name in event.names] for events in (made, wanted)]
+    names = [[*dict.fromkeys(name for event in events for name in event.names)] for events in (made, wanted)]
     meet = len(wanted) > 1 and len(names[0]) == len(names[1])
     return names[0] == names[1] or (meet and made[-1].mode == wanted[-1].mode)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import attrs
 import numpy as np
@@ -14,6 +14,8 @@ from hybrid.system.graph import HybridSystem
 
 # A stretch is divided if an error at its start grows by more than this up to its end.
 LARGEST_GROWTH = 1e3
+# A touch that changes no component of the state by more than this share of it is none.
+SLIGHT = 1e-9
 
 
 @attrs.frozen
@@ -88,7 +90,7 @@ def route_of(system: HybridSystem, arc: HybridArc, period: float) -> tuple[Route
 
     The first stretch begins after the first jump; without jumps it is the whole run.
     """
-    groups, n = instants(list(arc.jumps)), system.tangent_dimension
+    groups, n = instants(with_effect(system, arc.jumps)), system.tangent_dimension
     if not groups:
         mode, x = str(arc.mode[0]), arc.x[:1, :n].copy()
         stretch = Stretch(mode, mode, (), (), tuple(arc.x[0, n:].tolist()))
@@ -125,6 +127,31 @@ def accumulating(jumps: Sequence[Jump]) -> tuple[str, ...]:
     groups = instants(jumps)
     last = max((i for i, group in enumerate(groups) if group[0].kind == "limit"), default=None)
     return () if last is None else _accumulating([*groups[last + 1 :], *groups[: last + 1]])
+
+
+def with_effect(system: HybridSystem, jumps: Iterable[Jump]) -> list[Jump]:
+    """The jumps without impacts at no speed, which change nothing but for rounding.
+
+    Where a contact opens, its gap, the rate and the acceleration are zero, and rounding decides whether there
+    is one.
+    """
+    resets = {each.name for each in system.transitions if each.reset and each.source == each.target}
+
+    def is_nothing(jump: Jump) -> bool:
+        touches = jump.kind == "grazing" and jump.transition in resets
+        return touches and np.allclose(jump.x_minus, jump.x_plus, rtol=SLIGHT, atol=0.0)
+
+    return [jump for jump in jumps if not is_nothing(jump)]
+
+
+def from_limits(system: HybridSystem) -> set[str]:
+    """Names of the transitions that leave the mode of a limit at once, such as the one into a rest.
+
+    A run may pass one without a jump where its reset keeps the state to the last bit, so they tell no routes
+    apart.
+    """
+    limits = {each.accumulates_to for each in system.transitions}
+    return {each.name for each in system.transitions if each.source in limits and each.guard.at_start}
 
 
 def _without_chatter(groups: list[list[Jump]]) -> tuple[list[list[Jump]], list[tuple[str, ...]]]:
