@@ -103,7 +103,9 @@ def route_of(system: HybridSystem, arc: HybridArc, period: float) -> tuple[Route
     for group, after, passed in zip(groups, [*groups[1:], groups[0]], [*within[1:], within[0]], strict=True):
         names = tuple(jump.transition for jump in after)
         counters = tuple(group[-1].x_plus[n:].tolist())
-        stretches.append(Stretch(str(group[-1].target), after[0].source, passed, names, counters))
+        # A plastic impact may lead into a rest at once; a smooth stretch is in the mode that it ends in.
+        begin = str(group[-1].target) if passed else after[0].source
+        stretches.append(Stretch(begin, after[0].source, passed, names, counters))
     x = np.array([group[-1].x_plus[:n] for group in groups])
     times = np.array([group[0].t for group in groups] + [groups[0][0].t + period])
     # Where the order has been turned, the groups before the first one are those of the next period.
