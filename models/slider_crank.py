@@ -67,7 +67,9 @@ def slider_crank() -> HybridSystem:
     The paper starts on the line, at ``(0, 0, 0, 150, -75, 0)``: the crank turns at 150 rad/s. Both corners of
     a side then hit at once, and the slider does not tilt: after an impact both gap rates are ``-e`` times the
     same rate. A slider that is tilted by a little shows impacts of single corners. Between impacts the energy
-    stays the same, and the tilt grows uniformly in time.
+    stays the same, and the tilt grows uniformly in time. Without any tilt, rounding alone decides which
+    corner bounces last: such a run may end with the status STUCK, after some turns of the crank. Runs that
+    start with a tilt of 0.002 rad or more go on.
 
     References
     ----------
