@@ -18,7 +18,7 @@ from hybrid.compiler.arrays import clock_arrays, indices, leaving
 from hybrid.compiler.cache import store
 from hybrid.compiler.cache.folder import announced
 from hybrid.compiler.cache.loader import Absent, load_kernels
-from hybrid.compiler.parts import EVENTS, FIELDS, SERIES, TANGENT_SERIES, VARIATIONAL
+from hybrid.compiler.parts import EVENTS, FIELDS, SERIES, SLOPES, TANGENT_SERIES, VARIATIONAL
 from hybrid.compiler.surfaces import is_paired
 from hybrid.compiler.tables import Knots, unpacked
 from hybrid.compiler.traced import key_of
@@ -326,6 +326,7 @@ class CompiledSystem:
         return Model(
             **self.functions(FIELDS),
             **self.functions(EVENTS),
+            **self.functions(SLOPES),
             variational_field=Absent(),
             series=Absent(),
             **self.emitted.arrays(),

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from hybrid.expression.graph import contains, in_order, once, rewritten, with_arguments
+from hybrid.expression.linear import LinearEquations, dot, equations_of_solution, inputs_of
 from hybrid.expression.nodes import (
     HALF,
     MINUS_ONE,
@@ -59,36 +60,56 @@ def partial_derivatives(
     expressions: Iterable[Expression], variables: Sequence[Symbol]
 ) -> list[list[Expression]]:
     """Rows of the partial derivatives of ``expressions`` with respect to ``variables``."""
-    wanted = frozenset(variables)
-    rows = (_partials(expression, wanted) for expression in expressions)
+    rows = _partials(tuple(expressions), frozenset(variables))
     return [[row.get(each, ZERO) for each in variables] for row in rows]
 
 
 def derivative(expression: Expression, variable: Symbol) -> Expression:
     """The derivative in one variable."""
-    return _partials(expression, frozenset((variable,))).get(variable, ZERO)
+    [row] = _partials((expression,), frozenset((variable,)))
+    return row.get(variable, ZERO)
 
 
 def divergence(field: Sequence[Expression], variables: Sequence[Symbol]) -> Expression:
-    """Divergence of a field: the sum of the derivatives of each rate in its own variable."""
+    """Divergence of a field: the sum of the derivatives of each rate in its own variable, the first ones."""
     return add(*(row[i] for i, row in enumerate(partial_derivatives(field, variables))))
 
 
 @once
-def _partials(expression: Expression, wanted: frozenset[Symbol]) -> Partials:
-    """The nonzero partial derivatives of an expression."""
+def _partials(expressions: tuple[Expression, ...], wanted: frozenset[Symbol]) -> list[Partials]:
+    """The nonzero partial derivatives of each expression."""
     mask = 0
     for each in wanted:
         mask |= each.mask
     known: dict[Expression, dict[Symbol, Expression]] = {}
-    for node in in_order([expression]):
+    columns: dict[LinearEquations, dict[Symbol, list[Expression]]] = {}
+    for node in in_order(expressions, inputs_of):
+        solves = equations_of_solution(node)
         if not node.mask & mask:
             known[node] = {}
         elif isinstance(node, Symbol):
             known[node] = {node: ONE}
+        elif solves is not None:
+            equations, place = solves
+            if equations not in columns:
+                columns[equations] = _columns(equations, known)
+            row = equations.elimination.row_of_inverse(place)
+            sums = {v: dot(row, column) for v, column in columns[equations].items()}
+            known[node] = {v: total for v, total in sums.items() if total != 0}
         else:
             known[node] = _from_arguments(node, known)
-    return known[expression]
+    return [known[each] for each in expressions]
+
+
+def _columns(
+    equations: LinearEquations, known: Mapping[Expression, dict[Symbol, Expression]]
+) -> dict[Symbol, list[Expression]]:
+    """What the partial derivatives of the unknowns of linear equations are solved from."""
+    inputs = equations.inputs
+    return {
+        v: equations.column_of_derivative({each: known[each].get(v, ZERO) for each in inputs}.__getitem__)
+        for v in {v: None for each in inputs for v in known[each]}
+    }
 
 
 def _from_arguments(
@@ -141,9 +162,16 @@ def directional(expressions: Iterable[Expression], seeds: Mapping[Symbol, Expres
     """Derivatives along a vector, with one seed per symbol; common factors stay together."""
     expressions = [*expressions]
     along: dict[Expression, Expression] = {}
-    for node in in_order(expressions):
+    solutions: dict[LinearEquations, list[Expression]] = {}
+    for node in in_order(expressions, inputs_of):
+        solves = equations_of_solution(node)
         if isinstance(node, Symbol):
             along[node] = seeds.get(node, ZERO)
+        elif solves is not None:
+            equations, place = solves
+            if equations not in solutions:
+                solutions[equations] = equations.derivative(along.__getitem__)
+            along[node] = solutions[equations][place]
         elif isinstance(node, Select):
             along[node] = Select(node.args[0], *(along[each] for each in node.args[1:]))
         else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, lru_cache, reduce
+from operator import attrgetter
 from typing import Any, TypeVar
 
 from hybrid.expression.nodes import COUNTLESS, ONE, Expression, Function, Number, Symbol
@@ -58,8 +59,11 @@ def is_negative(expression: Expression) -> bool:
     return isinstance(expression, Number) and expression.value < 0
 
 
-def in_order(expressions: Iterable[Expression]) -> list[Expression]:
-    """Every node of the expressions once, each behind the nodes that it is computed from."""
+def in_order(
+    expressions: Iterable[Expression],
+    parts: Callable[[Expression], Iterable[Expression]] = attrgetter("args"),
+) -> list[Expression]:
+    """Every node of the expressions once, each behind the nodes that it is computed from: its ``parts``."""
     found: dict[Expression, None] = {}
     waiting: list[Any] = [*reversed([*expressions])]
     while waiting:
@@ -69,7 +73,7 @@ def in_order(expressions: Iterable[Expression]) -> list[Expression]:
         elif each not in found:
             if each.args:
                 waiting.append((each,))
-                waiting += [part for part in reversed(each.args) if part not in found]
+                waiting += [part for part in reversed([*parts(each)]) if part not in found]
             else:
                 found[each] = None
     return [*found]

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from hybrid.expression.graph import contains
+from hybrid.expression.linear import equations_of_solution
 from hybrid.expression.nodes import ONE, ZERO, Expression, add, multiply
 from hybrid.expression.operations import (
     JUMPING,
@@ -34,6 +35,9 @@ class Choice(NamedTuple):
 
 def plain(guard: Expression) -> Expression:
     """``e`` for an odd power or cubic root of it, ``floor(e) + 1/2``, and a choice by ``e`` of two signs."""
+    if equations_of_solution(guard) is not None:
+        # Its gradient follows from its equations, which a multiple of it does not solve.
+        return guard
     if isinstance(guard, CubeRoot) or _is_odd_power(guard):
         return plain(guard.args[0])
     if guard.is_sum and len(guard.args) == 2 and isinstance(guard.args[0], Floor):

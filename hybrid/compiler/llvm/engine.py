@@ -14,8 +14,8 @@ from hybrid.compiler.interrupts import between_passes
 from hybrid.compiler.llvm.registers import Vectors
 from hybrid.kernels.types.codes import NARROW, WIDE
 
-# LLVM's highest level of optimisation, and the lowest one that keeps numbers in registers.
-SPEED, HASTE = 3, 1
+# LLVM's highest level of optimisation, the lowest one that keeps numbers in registers, and none at all.
+SPEED, HASTE, PLAIN = 3, 1, 0
 
 
 @attrs.frozen(eq=False)

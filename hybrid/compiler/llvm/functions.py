@@ -24,7 +24,7 @@ from hybrid.compiler.llvm.lowering import (
 )
 from hybrid.compiler.llvm.machine import machine_code
 from hybrid.compiler.opaque import compiled_functions
-from hybrid.compiler.parts import PARTS
+from hybrid.compiler.parts import PARTS, SLOPES
 
 if TYPE_CHECKING:
     from hybrid.compiler.emitted import Emitted
@@ -47,6 +47,8 @@ SIGNATURES = {
 # In series, multiplications and additions may be fused. In a guard, fusing could make a difference of equal
 # terms nonzero.
 FUSED = ("series", "tangent_series", "series_abreast", "tangent_series_abreast")
+# What runs call once for an event, not on every step.
+RARE = PARTS[SLOPES]
 # What writes the instructions of these functions.
 BODIES = dict.fromkeys(("series_abreast", "tangent_series_abreast"), AbreastBody)
 
@@ -133,4 +135,4 @@ def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction | C
         )
         for name, kind in kinds.items()
     ]
-    return machine_code(wanted, calls)
+    return machine_code(wanted, calls, rare=all(kind in RARE for kind in kinds.values()))

@@ -8,12 +8,14 @@ from typing import Any
 from llvmlite import binding, ir
 
 from hybrid.compiler.interrupts import between_passes
-from hybrid.compiler.llvm.engine import HASTE, SPEED, target
+from hybrid.compiler.llvm.engine import HASTE, PLAIN, SPEED, target
 from hybrid.compiler.llvm.lowering import NO_CALLS, CaseTable, Function, OwnFunction, lower
 
 # Functions with more instructions than this, as written, are emitted in haste: LLVM's time grows faster than
 # their length, and they run no slower.
 LONG = 15000
+# Functions that runs call rarely are emitted as they are written if one has more instructions than this.
+LONG_FOR_RARE = 2000
 
 
 def _optimise(module: Any, *, repeats: bool) -> None:
@@ -40,11 +42,15 @@ def _optimise(module: Any, *, repeats: bool) -> None:
 
 @between_passes()
 def machine_code(
-    functions: Sequence[Function], calls: Mapping[str, OwnFunction | CaseTable] = NO_CALLS
+    functions: Sequence[Function],
+    calls: Mapping[str, OwnFunction | CaseTable] = NO_CALLS,
+    *,
+    rare: bool = False,
 ) -> bytes:
     """The contents of an object file with these functions.
 
-    ``calls`` are what they call of the user's functions and of tables of cases.
+    ``calls`` are what they call of the user's functions and of tables of cases. Functions that are called
+    rarely are not worth as much time of the compiler.
     """
     module = ir.Module("model")
     module.triple = binding.get_default_triple()
@@ -53,7 +59,11 @@ def machine_code(
         lower(module, written, calls)
     parsed = binding.parse_assembly(str(module))
     parsed.verify()
-    _optimise(parsed, repeats=any(each.repeats for each in functions))
     longest = max(sum(len(block.instructions) for block in each.blocks) for each in module.functions)
-    code: bytes = target(HASTE if longest > LONG else SPEED).emit_object(parsed)
+    code: bytes
+    if rare and longest > LONG_FOR_RARE:
+        code = target(PLAIN).emit_object(parsed)
+        return code
+    _optimise(parsed, repeats=any(each.repeats for each in functions))
+    code = target(HASTE if longest > LONG else SPEED).emit_object(parsed)
     return code

@@ -101,7 +101,7 @@ def _with_forcing(
     """The series of a field whose sines and exponentials of time are states."""
     driving = harmonics_of([*field, *guards], symbols)
     body = body_of(symbols, guards, [*driving.values()], lambda _: ONE_THEN_ZERO)
-    seeds, trace = seeds_of(symbols), divergence(field, symbols.x)
+    seeds, trace = seeds_of(symbols), divergence(field, symbols.variables)
     begun = [get(f"start{i}") for i in range(len(driving))]
     body.preamble += assignments(begun, list(driving))
     columns, starts = names_of_state(symbols)

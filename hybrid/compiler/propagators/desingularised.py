@@ -71,7 +71,7 @@ def write_desingularised(
     body.at_start[z] = power_of(get("root"), order)
     rates = [on_clock(rate, z, order) for rate in field]
     tangents = [on_clock(along, z, order) for along in directional(field, seeds)]
-    trace = on_clock(divergence(field, symbols.x), z, order)
+    trace = on_clock(divergence(field, symbols.variables), z, order)
     pace = ROOT ** (order - 1)
     turning = [pace * replaced(derivative(function, symbols.t), harmonics) for function in harmonics]
     begun = [get(f"start{i}") for i in range(len(harmonics))]

@@ -75,7 +75,7 @@ class Equations:
     @cached_property
     def jacobian(self) -> list[list[Expression]]:
         """``D_x f``."""
-        return partial_derivatives(self.field, self.symbols.x)
+        return [row[:-1] for row in partial_derivatives(self.field, self.symbols.variables)]
 
     @cached_property
     def is_affine(self) -> bool:

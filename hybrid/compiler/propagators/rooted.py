@@ -64,7 +64,7 @@ def write_rooted(
         signed |= places
     crossing = [signed.get(place, in_all_roots(guard)) for place, guard in enumerate(guards)]
     columns, starts = names_of_state(symbols)
-    trace = divergence(field, symbols.x)
+    trace = divergence(field, symbols.variables)
     return body.assemble(
         [*symbols.x, *(root.symbol for root in roots)],
         [*columns, *body.rows.values()],

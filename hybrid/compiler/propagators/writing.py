@@ -54,7 +54,7 @@ def write_series(
     body = (body_of or Body)(symbols, guards, (), lambda _: ONE_THEN_ZERO)
     seeds = seeds_of(symbols)
     tangents = directional(field, seeds)
-    trace = divergence(field, symbols.x)
+    trace = divergence(field, symbols.variables)
     return body.assemble(symbols.x, *names_of_state(symbols), field, guards, trace, tangents, seeds)
 
 

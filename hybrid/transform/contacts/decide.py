@@ -8,11 +8,11 @@ from typing import Any
 import attrs
 import numpy as np
 
+from hybrid.expression.linear import size_of
 from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.expression.operations import And, LessEqual
 from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.contacts.events import BREAKS, IMPACT, SETTLES, STOPS, SUDDEN, ContactEvent
-from hybrid.transform.contacts.linear import size_of
 from hybrid.transform.contacts.problem import NOISE, SHARED, Combination, Level, Outcome, outcome
 from hybrid.transform.contacts.solutions import (
     Found,

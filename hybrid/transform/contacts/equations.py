@@ -12,11 +12,11 @@ from hybrid.errors import ModelError
 from hybrid.expression.derivatives import derivative, jacobian_of
 from hybrid.expression.evaluation import Program
 from hybrid.expression.graph import mentions, replaced
+from hybrid.expression.linear import Vector, dot, solved
 from hybrid.expression.nodes import ZERO, Expression, Symbol, add, node
 from hybrid.expression.tracing import TraceError, model_symbols, trace
 from hybrid.system.derivatives import sample_points
 from hybrid.system.variables import Variables
-from hybrid.transform.contacts.linear import Vector, dot, solved
 
 # An asymmetry of the mass matrix, or a slope that has to vanish, may be this share of the largest entry.
 ROUNDING = 1e-9
@@ -113,12 +113,7 @@ class Equations:
         size = self.space.size
         if all(self.mass[i][j] is ZERO for i in range(size) for j in range(size) if i != j):
             return [[force / self.mass[i][i] for i, force in enumerate(column)] for column in columns]
-        return solved(self.mass, columns, self._example)
-
-    @property
-    def _example(self) -> np.ndarray:
-        """A positive definite mass matrix: pivots on its diagonal serve all."""
-        return np.eye(self.space.size)
+        return solved(self.mass, columns, definite=size)
 
 
 def equations_of(space: Space, mass: Any, forces: Any, kinetic: Any, potential: Any) -> Equations:

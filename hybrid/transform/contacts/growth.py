@@ -11,7 +11,8 @@ import numpy as np
 
 from hybrid.errors import ArgumentError
 from hybrid.expression.evaluation import Program, expressed, scalar
-from hybrid.expression.nodes import Expression, Number, node
+from hybrid.expression.linear import dot
+from hybrid.expression.nodes import ZERO, Expression, Number, node
 from hybrid.expression.operations import And, Not
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
@@ -21,7 +22,6 @@ from hybrid.transform.contacts.cases import Happening, Written
 from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.contacts.decide import NONE, SEQUENTIAL, SEVERAL_CASES, Decision, Judge, Undecided
 from hybrid.transform.contacts.events import BREAKS, IMPACT, JAMS, OPENS, SETTLES, STOPS, ContactEvent
-from hybrid.transform.contacts.linear import dot
 from hybrid.transform.contacts.modes import Held, held
 from hybrid.transform.contacts.order import order_matters
 from hybrid.transform.contacts.problem import Combination
@@ -122,6 +122,8 @@ class ContactGrowth(Stages):
         sample = self.original.variables
         anywhere = 0.0, np.ones(sample.dimension), sample.defaults
         self.free = self._make(nothing, anywhere)
+        # A mode that lasts no time may have any field.
+        self.still = expressed([ZERO] * sample.dimension)
 
     @property
     def told(self) -> Mapping[str, str]:
@@ -386,7 +388,7 @@ class ContactGrowth(Stages):
             if onward is not None:
                 transitions.append(onward)
         modes = [each.mode for each in self.made.values()]
-        moments = [Mode(name, self.free.mode.field) for name in self._moments]
+        moments = [Mode(name, self.still) for name in self._moments]
         given: dict[str, Any] = {
             "modes": [*modes, *moments],
             "transitions": transitions,

@@ -10,10 +10,10 @@ import attrs
 from hybrid.errors import ModelError, unknown_name
 from hybrid.expression.derivatives import derivative
 from hybrid.expression.graph import mentions
+from hybrid.expression.linear import Vector, dot
 from hybrid.expression.nodes import ZERO, Expression, add, node
 from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.contacts.equations import Space
-from hybrid.transform.contacts.linear import Vector, dot
 
 
 @attrs.frozen(eq=False)

@@ -10,6 +10,7 @@ import numpy as np
 
 from hybrid.expression.evaluation import Program, expressed
 from hybrid.expression.graph import mentions
+from hybrid.expression.linear import dot, solved
 from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.system.elements import Function
 from hybrid.system.growth import Place
@@ -20,8 +21,8 @@ from hybrid.transform.contacts.problem import (
     Level,
     bound,
     correlations,
+    equations_of_case,
     matrix,
-    outcome,
     solvability,
 )
 from hybrid.transform.contacts.statuses import IDLE, OPEN, SIGNS, STICKS
@@ -81,13 +82,13 @@ def held(
     exact, rows = mechanics.forces(view, closed), mechanics.rows_of(closed)
     there = mechanics.at(*place)
     numbers = matrix(mechanics.forces(there, closed), case)
-    pace = _pace(space, view.moved(_forces(exact, case, numbers), rows, view.free), place)
+    pace = _pace(space, _moving(mechanics, exact, case, rows, place)[1], place)
     level = attrs.evolve(
         exact,
         targets=[_gap_drawn_back(mechanics, i, pace) for i in closed],
         stops=[_slip_drawn_back(mechanics, i, pace) for i in closed],
     )
-    forces = _forces(level, case, numbers)
+    forces, accelerations = _moving(mechanics, level, case, rows, place)
     for k, i in enumerate(closed):
         normal[i] = node(forces[level.row(k)])
         if level.places[k][1] is not None:
@@ -95,7 +96,7 @@ def held(
         if case.sticks(k):
             bounds[i] = node(bound(level, case, k, forces))
     unknown = _undetermined(mechanics, now, there)
-    field = expressed([*space.u, *map(node, view.moved(forces, rows, view.free))])
+    field = expressed([*space.u, *accelerations])
     kept = [each for i in closed for each in (view.gaps[i], view.speeds[mechanics.places[i][0]])]
     kept += [
         view.speeds[row]
@@ -111,10 +112,33 @@ def held(
     return Held(field, expressed(kept), normal, tangential, bounds, room, unknown)
 
 
-def _forces(level: Level, case: Combination, numbers: np.ndarray) -> list[Any]:
-    found = outcome(level, case, (), numbers)
-    assert found is not None, "only numbers can fail to determine forces"
-    return found.forces
+def _moving(
+    mechanics: Mechanics, level: Level, case: Combination, rows: Sequence[int], place: Place
+) -> tuple[list[Any], list[Expression]]:
+    """The forces at the rows of a level, and the accelerations, in a case.
+
+    Both solve one system of equations: ``M a - W^T f = h``, and ``W a`` is given where a case wants it.
+    """
+    space, own = mechanics.space, [mechanics.rows[row] for row in rows]
+    unknowns, start, wanted = equations_of_case(level, case)
+    equations, right = [], []
+    for i, (masses, force) in enumerate(
+        zip(mechanics.equations.mass, mechanics.equations.forces, strict=True)
+    ):
+        acting = [row.weights[i] for row in own]
+        equations.append([*masses, *(-node(dot(acting, column)) for column in unknowns)])
+        right.append(force + node(dot(acting, start)))
+    for row, target in wanted:
+        equations.append([*own[row].weights, *[ZERO] * len(unknowns)])
+        right.append(target - own[row].bias)
+    program = Program([each for row in equations for each in row])
+    t, x, parameters = place
+    values = np.array(program.run(space.values(t, x, parameters)), dtype=float)
+    numbers = values.reshape(len(equations), len(equations))
+    [found] = solved(equations, [right], numbers, definite=space.size)
+    solution = found[space.size :]
+    forces = [first + dot([column[row] for column in unknowns], solution) for row, first in enumerate(start)]
+    return forces, found[: space.size]
 
 
 def _gap_drawn_back(mechanics: Mechanics, i: int, pace: float) -> Expression:

@@ -15,8 +15,8 @@ from typing import Any
 import attrs
 import numpy as np
 
+from hybrid.expression.linear import determinant, dot, size_of, solved
 from hybrid.expression.nodes import Expression, multiply, node
-from hybrid.transform.contacts.linear import determinant, dot, size_of, solved
 from hybrid.transform.contacts.statuses import IDLE, OPEN, SIGNS, STICKS, Statuses
 
 # What is smaller than this share of its terms is zero: it has been computed with rounding.
@@ -159,7 +159,7 @@ def outcome(
     numbers
         The matrix of the equations at a state, from `matrix`, if the level has expressions.
     """
-    unknowns, start, wanted = _equations(level, case)
+    unknowns, start, wanted = equations_of_case(level, case)
     rows = [[dot(level.delassus[row], column) for column in unknowns] for row, _ in wanted]
     right = [target - level.before[row] - dot(level.delassus[row], start) for row, target in wanted]
     solution = solved_in_numbers(rows, right) if numbers is None else solved(rows, [right], numbers)[0]
@@ -174,7 +174,7 @@ def outcome(
 
 def matrix(level: Level, case: Combination) -> np.ndarray:
     """The matrix of the equations of a case, in numbers."""
-    unknowns, _, wanted = _equations(level, case)
+    unknowns, _, wanted = equations_of_case(level, case)
     return np.array([[dot(level.delassus[row], column) for column in unknowns] for row, _ in wanted])
 
 
@@ -183,13 +183,15 @@ def solvability(level: Level, case: Combination, numbers: np.ndarray) -> Express
 
     With friction they may become so: Painleve's paradox begins there. It is 1 without friction at a contact.
     """
-    unknowns, _, wanted = _equations(level, case)
+    unknowns, _, wanted = equations_of_case(level, case)
     rows = [[dot(level.delassus[row], column) for column in unknowns] for row, _ in wanted]
     scale = multiply(*(node(level.delassus[row][row]) for row, _ in wanted))
     return determinant(rows, numbers) / scale
 
 
-def _equations(level: Level, case: Combination) -> tuple[list[list[Any]], list[Any], list[tuple[int, Any]]]:
+def equations_of_case(
+    level: Level, case: Combination
+) -> tuple[list[list[Any]], list[Any], list[tuple[int, Any]]]:
     """Forces by rows for a unit of each unknown, and without any; the rows that have a target, with it."""
     size = len(level.before)
     unknowns, start, wanted = [], [0.0] * size, []

@@ -14,12 +14,12 @@ import numpy as np
 
 from hybrid.expression.evaluation import Program, scalar
 from hybrid.expression.graph import all_replaced
+from hybrid.expression.linear import dot
 from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.expression.operations import Absolute, Maximum, sqrt
 from hybrid.system.outputs import Formula, Output
 from hybrid.transform.contacts.equations import Equations, Space
 from hybrid.transform.contacts.kinematics import Kinematics, Row
-from hybrid.transform.contacts.linear import dot
 from hybrid.transform.contacts.problem import Level
 from hybrid.transform.contacts.statuses import FREE
 

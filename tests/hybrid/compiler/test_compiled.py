@@ -13,6 +13,7 @@ from hybrid.compiler.parts import (
     FIELDS,
     PARTS,
     SERIES,
+    SLOPES,
     TANGENT_SERIES,
     VARIATIONAL,
 )
@@ -70,7 +71,7 @@ def test_what_tracing_proves():
 def test_a_run_compiles_only_what_it_needs():
     system = impact_oscillator()
     parts = compile_system(system).parts
-    needed = {FIELDS, EVENTS}
+    needed = {FIELDS, EVENTS, SLOPES}
     assert set(parts) == needed
     start, span = (0.3, -0.5), (0.0, 5.0)
     alone = hybrid.simulate(system, start, span)

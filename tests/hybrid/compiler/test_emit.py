@@ -10,7 +10,7 @@ import pytest
 from hybrid.compiler.compiled import compile_system
 from hybrid.compiler.emit import emit
 from hybrid.compiler.llvm.functions import compiled_part, own_functions
-from hybrid.compiler.parts import EVENTS, FIELDS
+from hybrid.compiler.parts import EVENTS, FIELDS, SLOPES
 from hybrid.errors import ModelError
 from hybrid.kernels.types.codes import EXACT, RUNGE_KUTTA
 from hybrid.system.derivatives import sample_points
@@ -26,12 +26,16 @@ def load(emitted, *, compiled):
     """The six compiled functions."""
     if compiled:
         own = own_functions(emitted)
-        functions = compiled_part(emitted, FIELDS, own) | compiled_part(emitted, EVENTS, own)
+        functions = (
+            compiled_part(emitted, FIELDS, own)
+            | compiled_part(emitted, EVENTS, own)
+            | compiled_part(emitted, SLOPES, own)
+        )
         return {name: called(function) for name, function in functions.items()}
     calls = {}
     for name, own in emitted.opaque.items():
         calls |= {name: in_python(own), f"{name}_slopes": slopes_in_python(own)}
-    return functions_in(emitted.texts[FIELDS] + emitted.texts[EVENTS], calls)
+    return functions_in("".join(emitted.texts[part] for part in (FIELDS, EVENTS, SLOPES)), calls)
 
 
 def in_python(own):

@@ -98,8 +98,8 @@ def test_a_second_process_loads_what_the_first_one_compiled(shared_kernels):
     assert imported == ""
     [models] = shared_kernels.glob("models-*")
     kept = sorted(models.iterdir())
-    # Two models, each with its fields, its events and its series.
-    assert [path.suffix for path in kept] == [".json"] * 2 + [".o"] * 6
+    # Two models, each with its fields, its events, the slopes of these, and its series.
+    assert [path.suffix for path in kept] == [".json"] * 2 + [".o"] * 8
     stamps = [path.stat().st_mtime_ns for path in kept]
     assert run() == [first, ""]
     assert sorted(models.iterdir()) == kept
