@@ -51,9 +51,10 @@ def jacobian_of(expressions: Iterable[Expression], variables: Iterable[Symbol]) 
     and so has the length ``np.hypot`` at the origin. Piecewise constant functions have slope zero.
     """
     rows = partial_derivatives(expressions, list(variables))
-    return [
-        [entry if entry is ZERO else close_gates(defined_at_origin(entry)) for entry in row] for row in rows
-    ]
+    found = in_order(entry for row in rows for entry in row)
+    if any(each.is_power and _is_over_length(*each.args) for each in found):
+        rows = [[defined_at_origin(entry) for entry in row] for row in rows]
+    return [[close_gates(entry) for entry in row] for row in rows]
 
 
 def partial_derivatives(
