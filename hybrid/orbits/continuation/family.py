@@ -21,6 +21,7 @@ from hybrid.simulation.repeated import Repeated
 from hybrid.solvers import Solver
 from hybrid.system.functions import field_function, guard_function, reset_function
 from hybrid.system.graph import HybridSystem
+from hybrid.system.growth import stage_of
 from hybrid.system.periodicity import period_at
 from hybrid.transform.extended import extended
 from hybrid.transform.restricted import BEYOND, ends_of, restricted
@@ -79,6 +80,11 @@ class Family:
         if slopes.shape[-1] == last + 1:
             return slopes
         return np.delete(slopes, np.s_[last : slopes.shape[-1] - 1], axis=-1)
+
+    @property
+    def latest(self) -> Family:
+        """The same family, of the system with all modes that runs have made by now."""
+        return attrs.evolve(self, system=stage_of(self.system))
 
     @property
     def forced(self) -> bool:

@@ -138,7 +138,7 @@ class Pass:
         flows = tuple(self.flows[i] for i in lasting)
         times = np.append(self.loop.times[lasting], self.loop.times[-1])
         loop = Loop(self.loop.x[lasting], times, self.loop.values)
-        family = attrs.evolve(self.family, route=tuple(stretches))
+        family = attrs.evolve(self.family.latest, route=tuple(stretches))
         return Pass(family, loop, flows, (None,) * len(flows)).parted
 
     def units(self, sizes: np.ndarray) -> np.ndarray:

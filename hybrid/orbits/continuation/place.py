@@ -20,7 +20,6 @@ from hybrid.orbits.zeros import SHARES, at_zero, interpolated, zero_on_the_way
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
 from hybrid.solvers import Solver
-from hybrid.system.growth import stage_of
 from hybrid.transform.aged import aged, with_age
 
 # A step may turn by this angle (its cosine).
@@ -292,9 +291,7 @@ def start_of(family: Family, arc: HybridArc, period: float, values: np.ndarray) 
         # Where the period depends on a parameter a late start would move through the phases with it.
         forcing = family.period(values) / family.periods
         times = times - forcing * np.floor(times[0] / forcing)
-    # The run may have made modes that the system had not.
-    system = stage_of(family.system)
-    family = attrs.evolve(family, system=system, route=route, counted=counted, least=least, held=None)
+    family = attrs.evolve(family.latest, route=route, counted=counted, least=least, held=None)
     first = family.around(Loop(x, times, values))
     if first is None:
         return None

@@ -12,14 +12,17 @@ from hybrid.kernels.arithmetic.slopes import spread_of_rate
 from hybrid.kernels.types.codes import EXACT
 from hybrid.kernels.types.kinds import REAL
 from hybrid.kernels.types.layout import EPSILON, Method, Model, Run, Work
-from hybrid.kernels.types.options import KERNEL, exported
+from hybrid.kernels.types.options import INLINE, KERNEL, exported
 
 # A jump changes a rate by more than this share of it; one of less changes tangent vectors by no more.
 LEAST = 1e-6
+# It is more than the rounding of a rate whose terms cancel, as that of what a contact holds: more than this
+# share of the fastest rate, both in units of the tolerances.
+ROUNDED = 1e-9
 # A jump times the step is less than so many tolerances: methods see a jump by a thousandth of it, or more.
 MOST_TOLERANCES = 1e3
 # The step is halved so many times towards the largest change. At a jump most of the change is still there,
-# and at some time it is so many times what the derivatives and the rounding at both ends explain.
+# and at some time it is so many times what the derivatives at both ends explain.
 HALVINGS = 10
 UNEXPLAINED = 30.0
 
@@ -51,14 +54,25 @@ def _jumps_between(model, method, run, t, span, work):
     """Whether the field at the time ``t`` jumps between the state before the step and the one after it."""
     model.field(run.mode, t, work.departure, model.parameters, work.field)
     model.field(run.mode, t, run.y, model.parameters, work.field_after)
+    fastest = 0.0
+    for i in range(model.dimension):
+        rate = max(abs(work.field[i]), abs(work.field_after[i]))
+        fastest = max(fastest, rate / _tolerance(method, run, i, work))
     for i in range(model.dimension):
         before, after = work.field[i], work.field_after[i]
-        tolerance = method.atol + method.rtol * max(abs(run.y[i]), abs(work.departure[i]))
-        some = abs(after - before) > LEAST * (abs(before) + abs(after))
+        tolerance = _tolerance(method, run, i, work)
+        least = max(LEAST * (abs(before) + abs(after)), ROUNDED * fastest * tolerance)
+        some = abs(after - before) > least
         hidden = abs(after - before) * span < MOST_TOLERANCES * tolerance
         if some and hidden and _rate_jumps(model, run, t, i, before, after, work):
             return True
     return False
+
+
+@njit(**INLINE)
+def _tolerance(method, run, i, work):
+    """The error that component ``i`` may have on the step."""
+    return method.atol + method.rtol * max(abs(run.y[i]), abs(work.departure[i]))
 
 
 @njit(**KERNEL)
@@ -81,8 +95,7 @@ def _rate_jumps(model, run, t, i, before, after, work):
         if abs(after - before) < most:
             return False
         if abs(after - before) > UNEXPLAINED * _explained_change(model, run.mode, t, i, low, high, work):
-            rounding = _rounding_of_rate(model, run.mode, t, i, low, high, work)
-            return abs(after - before) > UNEXPLAINED * rounding
+            return True
     return False
 
 
@@ -95,22 +108,4 @@ def _explained_change(model, mode, t, i, low, high, work):
     for end in (low, high):
         model.field_jacobian(mode, t, end, model.parameters, work.jacobian)
         total += spread_of_rate(model, mode, i, work.jacobian, moves)
-    return total
-
-
-@njit(**KERNEL)
-def _rounding_of_rate(model, mode, t, i, low, high, work):
-    """How much the rate of component ``i`` scatters at two states that move by their rounding.
-
-    Its terms may cancel: the acceleration of what a contact holds is zero but for rounding.
-    """
-    near, total = work.error, 0.0
-    for end in (low, high):
-        model.field(mode, t, end, model.parameters, work.second_error)
-        own = work.second_error[i]
-        for ulps in (-2.0, -1.0, 1.0, 2.0):
-            for j in range(model.dimension):
-                near[j] = end[j] * (1.0 + ulps * EPSILON)
-            model.field(mode, t, near, model.parameters, work.second_error)
-            total += abs(work.second_error[i] - own)
     return total
