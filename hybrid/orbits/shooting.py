@@ -248,9 +248,10 @@ class Shooting:
         The equation of a shot that begins near a jump depends on which side of the jump the shot begins on.
         """
         shift = self._quiet_time(guess)
-        if shift == 0.0:
-            return self.newton(guess, False, tolerance, max_iterations)
         mode = self._trajectory(guess, self.mode).mode
+        if shift == 0.0:
+            # A step of the search may leave a curved gap, so that the state alone would tell of another mode.
+            return attrs.evolve(self, mode=mode).newton(guess, False, tolerance, max_iterations)
         shooting, moved = self._moved(guess, shift)
         asked = Asked(guess, mode, self.counters)
         return attrs.evolve(shooting, asked=asked).newton(moved, False, tolerance, max_iterations)
