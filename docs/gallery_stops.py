@@ -18,7 +18,7 @@ from hybrid import (
     stroboscopic_section,
 )
 from hybrid.measures import amplitude
-from hybrid.plot import COLOURS, plot_branch, plot_phase
+from hybrid.plot import COLOURS, plot_branch
 
 COARSE = DOP853(rtol=1e-7, atol=1e-9)
 DOTS = {"marker": ".", "markersize": 1.5, "mew": 0, "linestyle": "None", "color": COLOURS[0]}
@@ -143,17 +143,6 @@ def gear_pair(ax: Axes) -> None:
     ax.set_ylabel("amplitude of $x$")
 
 
-def rocking_block(ax: Axes) -> None:
-    system = models.rocking_block()
-    plot_phase(simulate(system, (0.22, 0.0), (0.0, 9.0)), "theta", "omega", ax=ax)
-    theta = np.linspace(-0.25, 0.25, 401)
-    separatrix = 2 * 2.0 * np.sin((0.25 - np.abs(theta)) / 2)
-    for sign in (1, -1):
-        ax.plot(theta, sign * separatrix, color="0.6", linewidth=0.9, zorder=0)
-    ax.set_xlabel(r"tilt $\theta$ (rad)")
-    ax.set_ylabel(r"angular velocity $\omega$ (rad/s)")
-
-
 PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
     (
         "bouncing_table",
@@ -186,10 +175,5 @@ PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
         "Lift of a relief valve over the inflow: the equilibrium, stable to the Hopf point, and the tops of "
         "simulated motions, which flutter and hit the seat.",
         relief_valve,
-    ),
-    (
-        "rocking_block",
-        "A rocking block released close to the boundary of overturning, the grey curve.",
-        rocking_block,
     ),
 ]

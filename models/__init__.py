@@ -19,12 +19,14 @@ from models.impact_oscillator import impact_oscillator
 from models.impact_pair import impact_pair
 from models.infusion_schedule import infusion_schedule
 from models.interleaved_converter import interleaved_converter
+from models.newtons_cradle import newtons_cradle
 from models.pulse_coupled_neurons import pulse_coupled_neurons
 from models.refractory_neuron import refractory_neuron
 from models.relief_valve import relief_valve
 from models.rimless_wheel import rimless_wheel
 from models.rocking_block import rocking_block
 from models.sampled_loop import sampled_loop
+from models.shaken_stack import shaken_stack
 from models.simplest_walker import simplest_walker
 from models.slider_crank import slider_crank
 from models.slip_hopper import slip_hopper
@@ -35,6 +37,7 @@ from models.switched_arrival import switched_arrival
 from models.three_disk_billiard import three_disk_billiard
 from models.verge_escapement import verge_escapement
 from models.vibroimpact import vibroimpact
+from models.woodpecker import woodpecker
 
 __all__ = [
     "ball_chain",
@@ -56,12 +59,14 @@ __all__ = [
     "impact_pair",
     "infusion_schedule",
     "interleaved_converter",
+    "newtons_cradle",
     "pulse_coupled_neurons",
     "refractory_neuron",
     "relief_valve",
     "rimless_wheel",
     "rocking_block",
     "sampled_loop",
+    "shaken_stack",
     "simplest_walker",
     "slider_crank",
     "slip_hopper",
@@ -72,4 +77,5 @@ __all__ = [
     "three_disk_billiard",
     "verge_escapement",
     "vibroimpact",
+    "woodpecker",
 ]

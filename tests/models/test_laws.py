@@ -11,6 +11,7 @@ from hybrid import Guard, Laws, Reset
 from hybrid.system.graph import laws_of
 from hybrid.testing import Case, PropertyError, check_laws, check_system
 from hybrid.testing.contacts import COEFFICIENTS, FORCES, IMPACTS
+from hybrid.testing.coverage import IMPACTS_OF
 from hybrid.testing.crossings import CROSSINGS
 from hybrid.testing.dimensions import DIMENSIONS
 from hybrid.testing.events import JUMPS, SIDES
@@ -119,6 +120,14 @@ RUNS = {
     ),
     "impact_oscillator": (models.impact_oscillator(), {"states": {"x": (-1.0, 0.7)}, "t_span": (0.0, 7.0)}),
     "impact_pair": (models.impact_pair(), {"states": {"x": (-1.5, 1.5)}, "t_span": (0.0, 8.0)}),
+    "newtons_cradle": (
+        models.newtons_cradle(),
+        {
+            "states": {"x1": (-0.2, -0.1), "x2": (-0.05, 0.0), "x3": (0.05, 0.1)},
+            "parameters": {"e": (0.5, 1.0), "d": (0.0, 0.02)},
+            "t_span": (0.0, 2.0),
+        },
+    ),
     "refractory_neuron": (
         models.refractory_neuron(),
         {"states": {"u": (-70.0, -55.0)}, "t_span": (0.0, 60.0)},
@@ -138,14 +147,30 @@ RUNS = {
     "rocking_block": (
         models.rocking_block(),
         {
-            "states": {"theta": (-0.15, 0.15), "omega": (-0.2, 0.2)},
-            "parameters": {"A": (0.0, 0.3)},
-            "t_span": (0.0, 2.0),
+            "states": {
+                **{"x": 0.0, "y": (1.01, 1.03), "theta": (-0.1, 0.1)},
+                **{"u": (-0.3, 0.3), "v": (-0.3, 0.3), "omega": (-0.2, 0.2)},
+            },
+            "parameters": {"A": (0.0, 0.3), "e": (0.0, 0.5)},
+            "t_span": (0.0, 0.5),
+            "examples": 4,
         },
     ),
     "sampled_loop": (
         models.sampled_loop(),
         {"states": {"y": (-1.0, 2.0), "u": (-1.0, 1.0), "e": (-1.0, 1.0)}, "t_span": (0.0, 1.5)},
+    ),
+    "shaken_stack": (
+        models.shaken_stack(),
+        {
+            "states": {
+                **{"x1": 0.0, "x2": 0.0, "y1": (0.0, 0.02), "y2": (0.02, 0.04)},
+                **{"u1": (-0.3, 0.3), "u2": (-0.3, 0.3), "v1": (-0.3, 0.3), "v2": (-0.3, 0.3)},
+            },
+            "parameters": {"e": (0.0, 0.5), "A": (0.3, 1.0)},
+            "t_span": (0.0, 0.3),
+            "examples": 4,
+        },
     ),
     "simplest_walker": (
         models.simplest_walker(),
@@ -215,6 +240,18 @@ RUNS = {
             "t_span": (0.0, 0.4),
         },
     ),
+    "woodpecker": (
+        models.woodpecker(),
+        {
+            "states": {
+                **{"y": 0.0, "phi_M": (-0.1, 0.1), "phi_S": (0.0, 0.1)},
+                **{"v": (-0.4, 0.0), "omega_M": (1.0, 3.0), "omega_S": (2.0, 8.0)},
+            },
+            "parameters": {"e": (0.3, 0.6), "mu": (0.2, 0.4)},
+            "t_span": (0.0, 0.04),
+            "examples": 4,
+        },
+    ),
 }
 # Properties of systems with a continuous event, or of elastic ones.
 UNCHECKED = {CONTINUITY, ELASTIC}
@@ -224,6 +261,8 @@ TIMED = {SIDES, CROSSINGS, CUT, EXTENSION, FLOW_DIRECTION}
 # What needs runs with impacts.
 OF_CONTACTS = {COEFFICIENTS, FORCES, IMPACTS, LIMITS}
 OF_JUMPS = {EXTENSION, FLOW_DIRECTION, JUMPS, LANDINGS, SALTATION}
+# Few runs are drawn of bodies with several contacts, whose modes are many.
+OF_FEW = {FORCES, IMPACTS, LIMITS, SUM_RULE}
 MORE_UNCHECKED = {
     "solvable_oscillator": {CROSSINGS, SIDES},
     "bouncing_table": {CUT},
@@ -241,12 +280,24 @@ MORE_UNCHECKED = {
     "cam_follower": {FLOW_DIRECTION},
     # Its runs are few, since each start in contact has modes of its own; other tests check its contacts.
     "slider_crank": {*OF_CONTACTS, *OF_JUMPS},
+    "newtons_cradle": {*OF_FEW, SIDES},
+    "rocking_block": OF_FEW,
+    "shaken_stack": OF_FEW,
+    "woodpecker": OF_FEW,
 }
-# Few starts lead to these; a belt carries a block away from where it would slip ahead.
+# Few starts lead to these, or few are drawn; a belt carries a block away from where it would slip ahead.
 RARE = {
     "dry_friction_oscillator": {"two-fold", "sliding->above"},
     "stick_slip": {"two-fold", "sliding->above"},
     "slider_crank": {f"impacts of contact '{corner}'" for corner in CORNERS},
+    **{
+        name: {IMPACTS_OF.format(contact) for contact in contacts}
+        for name, contacts in {
+            "rocking_block": ("left", "right"),
+            "shaken_stack": ("1", "2"),
+            "woodpecker": ("beak", "lower", "upper"),
+        }.items()
+    },
 }
 
 

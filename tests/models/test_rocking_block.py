@@ -1,4 +1,4 @@
-"""The rocking block: free rocking by energy and quadrature, Housner's and Hogan's slender block."""
+"""The rocking block: free rocking by energy and quadrature, Housner's equations, and what begins first."""
 
 import math
 
@@ -7,13 +7,21 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 from models import rocking_block
 
-ALPHA, P, E = 0.25, 2.0, 0.9
-TIGHT = hybrid.DOP853(rtol=1e-12, atol=1e-15)
-# Slender enough to neglect quadratic terms, with matching tolerances.
-SLENDER = 1e-5
-FINE = hybrid.DOP853(rtol=1e-12, atol=1e-18)
+ALPHA, R, G = 0.25, 1.0, 9.81
+P = math.sqrt(3 * G / (4 * R))
+KEPT = 1 - 1.5 * math.sin(ALPHA) ** 2
+TIGHT = hybrid.Taylor(rtol=1e-13, atol=1e-15)
+THETA, OMEGA = 2, 5
+
+
+def on_a_corner(theta, omega=0.0, alpha=ALPHA):
+    """A state in which the lower corner is on the ground and at rest."""
+    angle = alpha - abs(theta)
+    rise = math.copysign(R * math.sin(angle), theta) * omega
+    return np.array([0.0, R * math.cos(angle), theta, -R * math.cos(angle) * omega, rise, omega])
 
 
 def quarter_period(theta0):
@@ -27,82 +35,121 @@ def quarter_period(theta0):
     return mp.quad(integrand, [0, mp.sqrt(theta0) / 2, mp.sqrt(theta0)])
 
 
+def pivots():
+    """Housner's equations, by hand: rotation about one corner or the other, and his factor at impacts."""
+
+    def about(side):
+        def field(t, x, p):
+            angle = p.alpha - side * x.theta
+            ground = p.A * np.cos(p.w * t)
+            return x.omega, -(P**2) * (side * np.sin(angle) - ground * np.cos(angle))
+
+        return field
+
+    loss = Reset(lambda t, x, p: (0.0, (1 - 1.5 * np.sin(p.alpha) ** 2) * x.omega))
+    return HybridSystem(
+        state=("theta", "omega"),
+        parameters={"alpha": ALPHA, "A": 0.0, "w": 2 * np.pi},
+        modes=[Mode("left", about(+1)), Mode("right", about(-1))],
+        transitions=[
+            Transition("left", "right", Guard(lambda t, x, p: x.theta, direction=-1), loss),
+            Transition("right", "left", Guard(lambda t, x, p: x.theta, direction=+1), loss),
+        ],
+        period=lambda p: 2 * np.pi / p.w,
+    )
+
+
 def test_free_rocking():
-    """Each impact leaves ``e^2`` of the energy, which gives the next amplitude and its time."""
+    """Each impact leaves the factor squared of the energy: the next amplitude, and its time."""
     amplitudes = [mp.mpf("0.2")]
     for _ in range(6):
         fall = mp.cos(ALPHA - amplitudes[-1]) - mp.cos(ALPHA)
-        amplitudes.append(ALPHA - mp.acos(mp.cos(ALPHA) + E**2 * fall))
+        amplitudes.append(ALPHA - mp.acos(mp.cos(ALPHA) + KEPT**2 * fall))
     quarters = np.array([float(quarter_period(theta)) for theta in amplitudes])
     impacts = np.cumsum(quarters[:-1] + np.append(0.0, quarters[1:-1]))
     tops = impacts + quarters[1:]
-    arc = hybrid.simulate(rocking_block(), (0.2, 0.0), (0.0, tops[-1]), solver=TIGHT)
+    arc = hybrid.simulate(rocking_block(), on_a_corner(0.2), (0.0, tops[-1]), solver=TIGHT)
     np.testing.assert_allclose(arc.jumps.t, impacts, rtol=0, atol=1e-10)
     exact = [-float(theta) * (-1) ** k for k, theta in enumerate(amplitudes[1:])]
-    np.testing.assert_allclose([arc(t)[0] for t in tops], exact, rtol=0, atol=1e-11)
+    np.testing.assert_allclose([arc(t)[THETA] for t in tops], exact, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("alpha", [0.1, 0.3, 0.5])
+def test_the_factor_of_housner(alpha):
+    """It follows from the impulses of two contacts; no equation of the model has it."""
+    arc = hybrid.simulate(
+        rocking_block(), on_a_corner(0.2 * alpha, alpha=alpha), (0.0, 1.0), parameters={"alpha": alpha}
+    )
+    rates = arc.jumps.x_plus[:2, OMEGA] / arc.jumps.x_minus[:2, OMEGA]
+    assert len(rates) == 2
+    np.testing.assert_allclose(rates, 1 - 1.5 * math.sin(alpha) ** 2, rtol=1e-10)
 
 
 def test_the_slender_block_of_housner():
-    """``arcosh(1 / (1 - theta0 / alpha)) / p``, up to terms in ``alpha^2``."""
-    arc = hybrid.simulate(
-        rocking_block(), (0.7 * SLENDER, 0.0), (0.0, 1.0), parameters={"alpha": SLENDER}, solver=FINE
+    """The period is ``4 arcosh(1 / (1 - theta0 / alpha)) / p``, up to terms in ``alpha^2``."""
+    alpha, share = 1e-4, 0.7
+    start = on_a_corner(share * alpha, alpha=alpha)
+    arc = hybrid.simulate(rocking_block(), start, (0.0, 4.0), parameters={"alpha": alpha}, solver=TIGHT)
+    quarter = math.acosh(1 / (1 - share)) / P
+    np.testing.assert_allclose(arc.jumps.t[:3], [quarter, 3 * quarter, 5 * quarter], rtol=1e-6)
+
+
+def test_the_block_comes_to_rest_on_both_corners():
+    arc = hybrid.simulate(rocking_block(), on_a_corner(0.1), (0.0, 10.0))
+    assert str(arc.mode[-1]) == "left sticks, right sticks"
+    # The left corner has not moved.
+    shift = R * (math.sin(ALPHA) - math.sin(ALPHA - 0.1))
+    np.testing.assert_allclose(arc.x[-1], [shift, R * math.cos(ALPHA), 0.0, 0.0, 0.0, 0.0], atol=1e-9)
+    assert np.nansum([arc[f"{side}.normal"][-1] for side in ("left", "right")]) == pytest.approx(G)
+
+
+def test_shaken_the_block_turns_as_by_the_equations_of_housner():
+    parameters = {"A": 0.3, "w": 6.0}
+    by_contacts = hybrid.simulate(
+        rocking_block(), on_a_corner(0.15), (0.0, 3.0), parameters=parameters, solver=TIGHT
     )
-    assert arc.jumps[0].t == pytest.approx(math.acosh(1 / 0.3) / P, abs=1e-9)
-
-
-def test_impacts_accumulate():
-    arc = hybrid.simulate(rocking_block(), (0.2, 0.0), (0.0, 30.0))
-    assert arc.status.code == hybrid.StatusCode.ACCUMULATION
-    np.testing.assert_allclose(arc.x[-1], 0.0, atol=1e-12)
-
-
-def test_elastic_rocking_is_a_shear():
-    """The tangent map over a period from rest follows from the period as a function of the amplitude."""
-    theta0 = 0.15
-    T = 4 * float(quarter_period(theta0))
-    arc = hybrid.simulate(
-        rocking_block(), (theta0, 0.0), (0.0, T), parameters={"e": 1.0}, tangent=True, solver=TIGHT
+    by_hand = hybrid.simulate(
+        pivots(), (0.15, 0.0), (0.0, 3.0), mode="left", parameters=parameters, solver=TIGHT
     )
-    acceleration = -(P**2) * math.sin(ALPHA - theta0)
-    exact = [[1.0, 0.0], [-acceleration * 4 * float(mp.diff(quarter_period, theta0)), 1.0]]
-    np.testing.assert_allclose(arc.x[-1], (theta0, 0.0), atol=1e-10)
-    np.testing.assert_allclose(arc.fundamental, exact, rtol=1e-8, atol=1e-8)
+    assert len(by_hand.jumps) == 4
+    np.testing.assert_allclose(by_contacts.jumps.t, by_hand.jumps.t, rtol=0, atol=1e-10)
+    t = np.linspace(0.0, 3.0, 50)
+    np.testing.assert_allclose(by_contacts(t)[:, [THETA, OMEGA]], by_hand(t), atol=1e-9)
 
 
-def harmonic_orbit(beta, w, e):
-    """Symmetric orbit of the slender block: phase and speed as it leaves zero, and its multipliers.
-
-    In units of ``alpha`` and ``1 / p`` it is ``x'' = x - 1 - beta cos(w t)`` from ``(0, V)`` to
-    ``(0, -V / e)`` in half a period. Without the forced response, ``(1 + c, s)`` at the start and
-    ``(1 - c, -s)`` at the end, the flow is free and linear in ``c``, ``s`` and ``V``, and
-    ``c^2 + (s / w)^2`` is known.
-    """
-    ch, sh = math.cosh(math.pi / w), math.sinh(math.pi / w)
-    flow = np.array([[ch, sh], [sh, ch]])
-    response = beta / (1 + w**2)
-    constant = np.linalg.solve(flow + np.eye(2), [1 - ch, -sh])
-    per_speed = np.linalg.solve(flow + np.eye(2), [sh, ch + 1 / e])
-    a, b = (values * (1.0, 1 / w) for values in (per_speed, constant))
-    V = max(np.roots([a @ a, 2 * a @ b, b @ b - response**2]))
-    c, s = constant + per_speed * V
-    ground = beta * c / response
-    bend = ((1 + ground) - e * (-1 + ground)) / (-V / e)
-    multipliers = np.linalg.eigvals(np.array([[e, 0.0], [bend, e]]) @ flow) ** 2
-    return math.atan2(-s / w, c) / w, V, multipliers
-
-
-@pytest.mark.parametrize(("beta", "w", "e"), [(3.0, 4.0, 0.9), (2.0, 2.0, 0.7), (5.0, 2.0, 0.9)])
-def test_rocking_with_the_ground(beta, w, e):
-    """The cases are stable, a node, and unstable."""
-    t, V, multipliers = harmonic_orbit(beta, w, e)
-    parameters = {"alpha": SLENDER, "p": 1.0, "e": e, "A": beta * SLENDER, "w": w}
-    quarter = math.pi / (2 * w)
-    options = {"mode": "right", "parameters": parameters, "solver": FINE}
-    guess = hybrid.simulate(rocking_block(), (0.0, V * SLENDER), (t, t + quarter), **options).x[-1]
-    orbit = hybrid.periodic_orbit(rocking_block(), guess * 1.001, t0=t + quarter, **options)
+def test_rocking_with_the_ground():
+    """A periodic orbit and its multipliers, beside those of the equations of Housner."""
+    given = {"t0": 0.2794, "parameters": {"A": 0.75, "w": 4 * P}}
+    by_hand = hybrid.periodic_orbit(pivots(), (0.061, 0.019), mode="left", **given)
+    orbit = hybrid.periodic_orbit(rocking_block(), on_a_corner(0.061, 0.019), **given)
+    assert by_hand.status.ok
     assert orbit.status.ok
-    np.testing.assert_allclose(orbit.x0 / SLENDER, guess / SLENDER, atol=1e-8)
-    np.testing.assert_allclose(orbit.arc(FINE).jumps.t, [t + 2 * quarter, t + 4 * quarter], atol=1e-8)
-    np.testing.assert_allclose(
-        np.sort_complex(orbit.multipliers), np.sort_complex(multipliers), rtol=1e-8, atol=1e-8
-    )
+    np.testing.assert_allclose(orbit.x0[[THETA, OMEGA]], by_hand.x0, atol=1e-8)
+    assert orbit.shift["x"] == pytest.approx(0.0, abs=1e-9)
+    # A shift along the ground has the multiplier 1, the directions that contacts forbid have 0.
+    exact = np.concatenate((by_hand.multipliers, [1.0, 0.0, 0.0, 0.0]))
+    np.testing.assert_allclose(np.sort(np.abs(orbit.multipliers)), np.sort(np.abs(exact)), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("A", "mu", "limit", "mode"),
+    [
+        (0.5, 1.0, math.tan(ALPHA), "left sticks"),
+        (0.5, 0.2, 0.2, "left slips -, right slips -"),
+        (0.2, 1.0, None, "left sticks, right sticks"),
+        (0.2, 0.21, None, "left sticks, right sticks"),
+    ],
+)
+def test_what_begins_where_the_ground_shakes_harder(A, mu, limit, mode):
+    """From ``t = 0.75`` on the ground accelerates to the right: the block tips or lags to the left."""
+    arc = hybrid.simulate(rocking_block(), on_a_corner(0.0), (0.75, 0.9), parameters={"A": A, "mu": mu})
+    assert str(arc.mode[-1]) == mode
+    began = [] if limit is None else [1.0 - math.acos(limit / A) / (2 * math.pi)]
+    assert [jump.t for jump in arc.jumps] == pytest.approx(began, abs=1e-9)
+
+
+def test_a_smooth_elastic_block_bounces_with_its_energy():
+    start = (0.0, 1.3, 0.1, 0.0, 0.0, 0.0)
+    arc = hybrid.simulate(rocking_block(), start, (0.0, 0.4), parameters={"mu": 0.0, "e": 1.0})
+    assert arc.jumps["left"]
+    np.testing.assert_allclose(arc["energy"], arc["energy"][0], rtol=1e-10)

@@ -441,3 +441,14 @@ def test_a_search_from_the_mode_of_another_time_asks_for_the_mode():
     assert "the orbit ends in mode 'off' and starts in 'on'" in wrong.status.message
     assert "name it with mode=" in wrong.status.remedy
     assert "max_iterations" not in wrong.status.remedy
+
+
+def test_a_search_from_a_curved_contact_stays_on_it():
+    """Steps of the search leave the circle of a corner by more than a gap that counts as closed."""
+    given = {"t0": 0.28, "parameters": {"A": 0.75, "w": 10.85}}
+    angle = 0.25 - 0.062
+    start = (0.0, math.cos(angle), 0.062, -0.02 * math.cos(angle), 0.02 * math.sin(angle), 0.02)
+    orbit = periodic_orbit(models.rocking_block(), start, **given)
+    assert orbit.status.ok
+    assert orbit.mode == "left sticks"
+    assert orbit.residual < 1e-10

@@ -219,7 +219,7 @@ class TestOfARun:
             # The jumps accumulate, and the limit has its own matrix.
             ("bouncing_table", (0.1, 0.0), "flight", 3.0),
             ("stop_oscillator", (0.0, 0.0), "free", 40.0),
-            ("rocking_block", (0.1, 0.1), "right", 3.0),
+            ("rocking_block", (0.0, np.cos(0.15), 0.1, 0.0, 0.0, 0.0), None, 3.0),
             ("stick_slip", (0.5, 0.2), "sliding", 60.0),
         ],
     )
