@@ -87,6 +87,29 @@ def test_a_ball_at_rest_lifts_off_once():
         assert arc.x[-1, 1] == pytest.approx(velocity, abs=1e-10)
 
 
+def test_the_gap_of_a_moving_table_gives_the_same_run():
+    """There bounces, chatter, rest and lift-off follow; in the model they are written by hand."""
+    table = hybrid.mechanics(
+        coordinates=("y",),
+        velocities=("v",),
+        parameters={"g": G, "e": E, "A": A, "w": W},
+        mass=lambda t, x, p: (1.0,),
+        forces=lambda t, x, p: (-p.g,),
+        contacts=[hybrid.Contact("table", gap=lambda t, x, p: x.y - p.A * np.sin(p.w * t), restitution="e")],
+        period=lambda p: 2 * np.pi / p.w,
+    )
+    by_hand = hybrid.simulate(bouncing_table(), (0.001, 0.0), (0.0, 1.0), mode="flight", solver=TIGHT)
+    by_gap = hybrid.simulate(table, (0.001, A * W), (0.0, 1.0), solver=TIGHT)
+    liftoffs = [jump.t for jump in by_hand.jumps["liftoff"]]
+    assert len(liftoffs) > 3
+    assert [jump.t for jump in by_gap.jumps["table opens"]] == pytest.approx(liftoffs, abs=1e-10)
+    t = np.linspace(0.0, 1.0, 200)
+    np.testing.assert_allclose(by_gap(t)[:, 0] - A * np.sin(W * t), by_hand(t)[:, 0], rtol=0, atol=1e-9)
+    rests = by_gap.mode == "table"
+    force = G - A * W**2 * np.sin(W * by_gap.t[rests])
+    np.testing.assert_allclose(by_gap["table.normal"][rests], force, atol=1e-9)
+
+
 def test_areas_contract_as_the_bounces_say():
     """``det Phi = e^(2 N)`` after N bounces of a chaotic run: a flight preserves areas."""
     parameters = {"A": 0.0125, "e": 0.8}
