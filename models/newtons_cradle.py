@@ -29,7 +29,8 @@ def newtons_cradle(balls: int = 3, impacts: str = "newton") -> HybridSystem:
     HybridSystem
         State ``x1``, ``x2``, ... (displacements, m) and ``v1``, ``v2``, ... (m/s); contacts ``1-2``, ``2-3``
         and so on. Parameters: ``w = 2 pi`` rad/s, restitution ``e = 1``, and the gap ``d = 1e-10`` m between
-        balls at rest. Balls no more than 1e-9 m apart take part in each other's impacts.
+        balls at rest. Balls no more than 1e-9 m apart take part in each other's impacts. Keep ``d`` above 0:
+        balls that touch exactly and swing alike neither press nor part, and runs end with ``STUCK``.
         Output: ``energy`` per mass of a ball (J/kg).
 
     Notes

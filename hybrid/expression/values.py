@@ -325,13 +325,13 @@ def _apply(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], options: dict[
             # The result of a single item is a boolean, too.
             inputs = (np.frompyfunc(_lifted("not_equal"), 2, 1)(_plain(inputs[0]), 0), *inputs[1:])
     out = options.pop("out", None)
-    if out is not None:  # x += 1 on an array
+    if out is not None and not isinstance(out[0], Traced):  # x += 1 on an array; a number becomes another
         if any(array.dtype != object for array in out):
             raise refusal(NEEDS_FLOATS)
         options["out"] = tuple(array.view(np.ndarray) for array in out)
     options.pop("dtype", None)
     result = getattr(elementwise, method)(*map(_plain, inputs), **options)
-    return _wrapped(result) if out is None else out[0]
+    return out[0] if "out" in options else _wrapped(result)
 
 
 def _where(condition: Any, *choices: Any) -> Any:

@@ -57,6 +57,7 @@ ARRAY = np.array([0.5, -1.5, 2.0, 0.25])
         lambda t, x, p: np.array([x[0], x[1] * p.k]),
         lambda t, x, p: np.stack([x, p.k * x]),
         lambda t, x, p: _filled(x),
+        lambda t, x, p: _summed(x),
     ],
 )
 def test_arrays(function):
@@ -70,6 +71,17 @@ def _filled(x):
     rate[:2] = x[2:]
     rate[2:] += 2 * x[:2]
     return rate
+
+
+def _summed(x):
+    total, product = 0.0, x[0]
+    for each in x:
+        total += each
+        product *= each
+        product -= 1.0
+    kept = total
+    total /= 2.0
+    return kept, total, product, x[0]
 
 
 def test_symbols_are_named_as_code_reads_them():
