@@ -18,6 +18,8 @@ from hybrid.transform.contacts.view import Mechanics
 # A start in a mode that holds a contact may have a gap, of either sign, of so many times that which counts as
 # closed: the contact is drawn back, and a run by a coarse solver goes on from its end.
 MOST_OPEN = 1e5
+# A coefficient beyond its range by no more than this is rounding: 1.0000000000000002 is a restitution of 1.
+ROUNDING = 1e-12
 
 
 @attrs.frozen(eq=False)
@@ -52,7 +54,7 @@ class Starts:
                     "leave the mode to the state."
                 )
         for (title, what, _), value in zip(self._coefficients, values[len(gaps) :], strict=True):
-            if not 0.0 <= value <= (1.0 if what == "restitution" else np.inf):
+            if not -ROUNDING <= value <= (1.0 + ROUNDING if what == "restitution" else np.inf):
                 allowed = "between 0 and 1" if what == "restitution" else "0 or more"
                 raise ArgumentError(f"parameters: {title}: {what} must be {allowed}; it is {value:g}.")
         return any(gap <= self.together for gap in gaps)

@@ -119,6 +119,12 @@ class TestSystem:
         with pytest.raises(hybrid.ArgumentError, match="restitution must be between 0 and 1"):
             simulate(ball(), (1.0, 0.0), (0.0, 1.0), parameters={"e": 1.5})
 
+    def test_coefficients_out_of_range_by_rounding(self):
+        arc = simulate(ball(), (1.0, 0.0), (0.0, 1.0), parameters={"e": np.nextafter(1.0, 2.0)})
+        assert arc.status.ok
+        [bounce] = arc.jumps["floor"]
+        assert bounce.x_plus[1] == pytest.approx(-bounce.x_minus[1], rel=1e-12)
+
     @pytest.mark.parametrize("name", ["free", "settles", "a sticks", "a,b", "a+b", ""])
     def test_names_that_modes_have(self, name):
         with pytest.raises(hybrid.ModelError, match="Contact: name"):
