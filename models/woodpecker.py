@@ -42,8 +42,9 @@ def woodpecker() -> HybridSystem:
       ``phi_S = phi_M - m_S g l_G / c = -0.2217``, if
       ``mu >= (m_S + m_M) h_M / (m_S (l_M + l_G) - (m_S + m_M) r_M) = 0.285``.
     - In flight bird and sleeve swing against each other at 72.91 Hz.
-    - Pecking is periodic but for the fall: the period is 0.1460 s (0.1452 s in the paper), the toy is
-      19.4 mm lower after it, and a multiplier of -0.839 says how fast pecks become alike.
+    - Pecking is periodic but for the fall: the period is 0.1460 s (0.1452 s in the paper, 0.1460 s by time
+      stepping), the bird turns back to -0.53 rad, the toy is 19.4 mm lower after each peck, and a
+      multiplier of -0.839 says how fast pecks become alike.
 
     The state of the examples is that of the start in the paper of 2005.
 

@@ -57,6 +57,14 @@ def test_pecking_is_periodic_but_for_the_fall(pecking):
     assert pecking.shift["y"] == pytest.approx(-0.01944538, abs=1e-7)
 
 
+def test_the_bird_swings_back_as_far_as_in_the_paper(pecking):
+    """While the sleeve jams it turns back to -0.53 rad; the beak stops it at 0.12 rad."""
+    t = np.linspace(pecking.t0, pecking.t0 + pecking.period, 2001)
+    turns = pecking.arc()(t)[:, 2]
+    assert turns.min() == pytest.approx(-0.53, abs=5e-3)
+    assert turns.max() == pytest.approx(0.12, abs=1e-3)
+
+
 def test_pecks_go_through_the_frames_of_the_paper(pecking):
     """Figure 7; between its frames the lower edge, which has no restitution, may touch for short times."""
     arc = pecking.arc()
