@@ -9,6 +9,7 @@ from typing import Any
 
 import mpmath as mp
 import numpy as np
+from numba import njit
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve, root_scalar
 
@@ -167,3 +168,64 @@ def compass_flip(field: Callable[..., Any], strike: Callable[..., Any], given: M
         return float(np.linalg.det((4 * fine - coarse) / 3 + np.eye(3)))
 
     return float(root_scalar(distance, x0=4.3, x1=4.4, xtol=1e-10).root)
+
+
+def woodpecker_inertia(p: Mapping[str, float]) -> np.ndarray:
+    """The inverse of the mass matrix of the woodpecker toy: the bird hangs on the arms of all coordinates."""
+    arms = np.array([[1.0, p["l_M"], p["l_G"]]])
+    return np.linalg.inv(p["m_S"] * arms.T @ arms + np.diag([p["m_M"], p["J_M"], p["J_S"]]))
+
+
+def woodpecker_frequency(p: Mapping[str, float]) -> float:
+    """The frequency at which bird and sleeve swing against each other in flight, in Hz."""
+    twist = np.array([0.0, 1.0, -1.0])
+    return float(np.sqrt(p["c"] * twist @ woodpecker_inertia(p) @ twist) / (2 * np.pi))
+
+
+def woodpecker_pecks(
+    x: np.ndarray, p: Mapping[str, float], seconds: float, step: float
+) -> tuple[float, float]:
+    """The mean time between pecks of the woodpecker toy by Moreau's scheme, and how far the bird turns back.
+
+    Contacts are impulses of Gauss-Seidel rounds: nothing is located, and nothing is known of modes.
+    """
+    m_S, l_M, l_G, r_M, h_M, h_S = (p[name] for name in ("m_S", "l_M", "l_G", "r_M", "h_M", "h_S"))
+    normals = np.array([[0.0, 0.0, -h_S], [0.0, h_M, 0.0], [0.0, -h_M, 0.0]])
+    slips = np.array([[1.0, l_M, l_G - p["l_S"]], [1.0, r_M, 0.0], [1.0, r_M, 0.0]])
+    play = np.array([l_M + l_G - p["l_S"] - p["r_0"], r_M - p["r_0"], r_M - p["r_0"]])
+    weight = -p["g"] * np.array([m_S + p["m_M"], m_S * l_M, m_S * l_G])
+    given = woodpecker_inertia(p), normals, slips, play, weight, p["c"], p["mu"], np.array([p["e"], 0.0, 0.0])
+    first, last, count, back = _stepped(x[:3].copy(), x[3:].copy(), round(seconds / step), step, given)
+    return (last - first) * step / (count - 1), back
+
+
+@njit
+def _stepped(q, u, steps, h, given):  # type: ignore[no-untyped-def]
+    """Steps of the first and the last peck, the number of pecks, and the smallest angle of the bird."""
+    inverse, normals, slips, play, weight, c, mu, e = given
+    first, last, count, back, was_closed = 0, 0, 0, 0.0, False
+    for k in range(steps):
+        q += 0.5 * h * u
+        twist = c * (q[1] - q[2])
+        before, gaps = normals @ u, play + normals @ q
+        u += h * (inverse @ (weight + np.array([0.0, -twist, twist])))
+        pushes, rubs, change = np.zeros(3), np.zeros(3), 1.0
+        while change > 1e-15:
+            change = 0.0
+            for i in range(3):
+                if gaps[i] <= 0.0:
+                    pull = inverse @ normals[i]
+                    push = max(pushes[i] - (normals[i] @ u + e[i] * before[i]) / (normals[i] @ pull), 0.0)
+                    u += pull * (push - pushes[i])
+                    pull = inverse @ slips[i]
+                    most = mu * push
+                    rub = min(max(rubs[i] - slips[i] @ u / (slips[i] @ pull), -most), most)
+                    u += pull * (rub - rubs[i])
+                    change = max(change, abs(push - pushes[i]), abs(rub - rubs[i]))
+                    pushes[i], rubs[i] = push, rub
+        if pushes[0] > 0.0 and not was_closed:
+            first = k if count == 0 else first
+            last, count = k, count + 1
+        was_closed, back = pushes[0] > 0.0, min(back, q[2])
+        q += 0.5 * h * u
+    return first, last, count, back
