@@ -47,6 +47,9 @@ def shaken_stack(boxes: int = 2) -> HybridSystem:
       ``u = A g / w (cos(w t1) - cos(w t)) - mu1 g (t - t1)``. In the long run it slides without a stop where
       ``A / mu1 > sqrt(1 + pi^2 / 4) = 1.862``, and sticks twice per period below.
 
+    Three equal coefficients reach their bounds at one instant, and what slips there is rounding: runs may end
+    with ``STUCK``. Choose coefficients that differ.
+
     References
     ----------
     N. M. Newmark, "Effects of earthquakes on dams and embankments", Géotechnique 15(2), 139-160, 1965.

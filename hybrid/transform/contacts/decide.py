@@ -30,6 +30,7 @@ from hybrid.transform.contacts.statuses import (
     SIGNS,
     SLIPS_DOWN,
     SLIPS_UP,
+    STICKS,
     Statuses,
     closed_statuses,
 )
@@ -226,6 +227,10 @@ class Judge:
             # What holds is over, unless the contacts can share what they bear in another way.
             before = now.of_closed(resting)
             found = [each for each in found if not is_shared(each.case, before) or each.margin > SHARED]
+            # Where several contacts reach their bounds at once, all cases agree: the one that breaks slips,
+            # and those that slip go on.
+            slipping = [k for k, i in enumerate(resting) if i == event.contact or now.statuses[i] in SIGNS]
+            found.sort(key=lambda each: sum(each.case.statuses[k] == STICKS for k in slipping))
             found.sort(key=lambda each: -each.margin if is_shared(each.case, before) else 0.0)
         found = by_history(level, found)
         kinds = several(level, found)
