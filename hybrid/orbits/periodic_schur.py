@@ -33,6 +33,8 @@ SAME_DIGITS = 9
 # Sweeps for one eigenvalue, and after how many without success the shifts are varied.
 MOST_SWEEPS = 60
 EXCEPTIONAL = 10
+# An entry below the diagonal that is this small after all sweeps stands between equal eigenvalues.
+EQUAL = 1e-6
 
 
 @attrs.frozen(eq=False)
@@ -218,8 +220,38 @@ class _Reduced:
                 stop, sweeps = first, 0
                 continue
             sweeps += 1
-            self._sweep(first, stop, sweeps)
+            if sweeps <= MOST_SWEEPS:
+                self._sweep(first, stop, sweeps)
+            elif not self._part(first, stop):
+                found += self._unseparated(first, stop)
+                stop, sweeps = first, 0
         return found
+
+    def _part(self, first: int, stop: int) -> bool:
+        """Part a block of eigenvalues as good as equal where it nearly parts; False if it does not."""
+        below = np.abs(np.diagonal(self.head, -1)[first : stop - 1])
+        i = first + 1 + int(np.argmin(below))
+        if below.min() > EQUAL * np.abs(self.head[first:stop, first:stop]).max():
+            return False
+        self.head[i, i - 1] = 0.0
+        return True
+
+    def _unseparated(self, first: int, stop: int) -> list[tuple[float, complex]]:
+        """Eigenvalues of a block that no sweep parts, from its product.
+
+        Factors that are singular but for rounding keep sweeps from parting what they annihilate from the
+        others. Those are right; what is annihilated is small.
+        """
+        product, scale = _scaled_product_with_log(self._blocks(first, stop))
+        found = np.linalg.eigvals(product)
+        moduli = np.abs(found)
+        return [
+            (
+                float(np.log(size)) + scale if size > 0.0 else -np.inf,
+                complex(each / size) if size > 0.0 else 1.0,
+            )
+            for each, size in zip(found, moduli, strict=True)
+        ]
 
     def _active(self, stop: int) -> int:
         """Where the last unreduced block that ends before ``stop`` begins; negligible entries become zero."""
@@ -233,11 +265,6 @@ class _Reduced:
 
     def _sweep(self, first: int, stop: int, sweeps: int) -> None:
         """One sweep of the implicit QR algorithm with two shifts, after Francis, on an unreduced block."""
-        if sweeps > MOST_SWEEPS:
-            # What has not separated by now is as good as equal.
-            i = first + 1 + int(np.argmin(np.abs(np.diagonal(self.head, -1)[first : stop - 1])))
-            self.head[i, i - 1] = 0.0
-            return
         product = _scaled_product(self._blocks(first, stop))
         corner = product[-2:, -2:]
         trace = corner[0, 0] + corner[1, 1]

@@ -202,11 +202,25 @@ def test_the_shifts_make_sweeps_converge_fast(monkeypatch):
     assert len(sweeps) < 3 * 30
 
 
-def test_what_has_not_separated_after_many_sweeps_is_taken_as_equal():
+def test_what_has_not_separated_after_many_sweeps_is_taken_as_equal_if_it_nearly_parts():
     """The smallest entry below the diagonal of the block becomes zero, and nothing else."""
     head = np.arange(1.0, 37.0).reshape(6, 6)
-    head[[1, 2, 3, 4, 5], [0, 1, 2, 3, 4]] = 0.001, 5.0, -0.5, 7.0, 0.002
+    head[[1, 2, 3, 4, 5], [0, 1, 2, 3, 4]] = 1e-9, 5.0, -1e-5, 7.0, 1e-9
     reduced = SimpleNamespace(head=head.copy())
-    periodic_schur._Reduced._sweep(reduced, 1, 5, periodic_schur.MOST_SWEEPS + 1)
+    assert periodic_schur._Reduced._part(reduced, 1, 5)
     head[3, 2] = 0.0
     np.testing.assert_array_equal(reduced.head, head)
+    head[3, 2] = -0.5
+    reduced = SimpleNamespace(head=head.copy())
+    assert not periodic_schur._Reduced._part(reduced, 1, 5)
+    np.testing.assert_array_equal(reduced.head, head)
+
+
+def test_a_block_that_no_sweep_parts_has_the_eigenvalues_of_its_product():
+    """Two directions that the factors turn and keep, and one that they annihilate."""
+    turn, _ = np.linalg.qr(np.arange(1.0, 10.0).reshape(3, 3) + np.eye(3))
+    chain = [turn @ np.diag([1.0, -0.5, 1e-200]), np.diag([2.0, 1.0, 1e-200]) @ turn.T]
+    reduced = periodic_schur._Reduced([each.copy() for each in chain])
+    found = reduced._unseparated(0, 3)
+    values = sorted(np.exp(size) * phase.real for size, phase in found)
+    np.testing.assert_allclose(values, [-0.5, 0.0, 2.0], atol=1e-12)
