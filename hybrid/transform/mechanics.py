@@ -122,9 +122,10 @@ def mechanics(
     from hybrid.expression.evaluation import expressed
     from hybrid.transform.contacts.decide import LAWS, Judge
     from hybrid.transform.contacts.equations import Space, equations_of
-    from hybrid.transform.contacts.growth import ContactGrowth, Origin
+    from hybrid.transform.contacts.growth import ContactGrowth
     from hybrid.transform.contacts.kinematics import kinematics_of
     from hybrid.transform.contacts.view import Mechanics
+    from hybrid.transform.deciding import Origin
 
     q, u = (_names(what, value) for what, value in (("coordinates", coordinates), ("velocities", velocities)))
     if set(q) & set(u):

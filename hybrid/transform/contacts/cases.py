@@ -18,22 +18,7 @@ from hybrid.transform.contacts.problem import NOISE, SHARED, Combination, Level,
 from hybrid.transform.contacts.solutions import is_shared, stopped
 from hybrid.transform.contacts.statuses import OPEN, SIGNS, STICKS
 from hybrid.transform.contacts.view import Mechanics, View
-
-
-@attrs.frozen(eq=False)
-class Written:
-    """A decision as expressions in the state at the event.
-
-    Attributes
-    ----------
-    conditions
-        What must hold for it.
-    state
-        The state after it; None if it stays.
-    """
-
-    conditions: list[Expression]
-    state: list[Expression] | None
+from hybrid.transform.deciding import Written
 
 
 @attrs.frozen(eq=False)

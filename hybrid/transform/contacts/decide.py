@@ -35,6 +35,7 @@ from hybrid.transform.contacts.statuses import (
     closed_statuses,
 )
 from hybrid.transform.contacts.view import Mechanics, View
+from hybrid.transform.deciding import NothingDecided
 
 
 @attrs.frozen
@@ -71,13 +72,11 @@ class Decision:
 
 
 @attrs.frozen
-class Undecided:
-    """Why nothing is decided.
+class Undecided(NothingDecided):
+    """Why nothing is decided: ``painleve`` if no case is consistent, ``not unique`` if several are.
 
     Attributes
     ----------
-    name
-        ``painleve`` if no case is consistent, ``not unique`` if several are.
     contacts
         Those that are concerned.
     sudden
@@ -86,7 +85,6 @@ class Undecided:
         What is consistent, by contact.
     """
 
-    name: str
     contacts: tuple[int, ...]
     sudden: bool
     cases: tuple[Statuses, ...] = ()

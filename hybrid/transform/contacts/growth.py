@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
-from functools import cached_property, reduce
+from collections.abc import Iterator, Mapping
+from functools import cached_property
 from typing import Any
 
 import attrs
@@ -12,13 +12,12 @@ import numpy as np
 from hybrid.errors import ArgumentError
 from hybrid.expression.evaluation import Program, expressed, scalar
 from hybrid.expression.linear import dot
-from hybrid.expression.nodes import ZERO, Expression, Number, node
-from hybrid.expression.operations import And, Not
-from hybrid.system.elements import Guard, Mode, Reset, Transition
+from hybrid.expression.nodes import ZERO, Number, node
+from hybrid.system.elements import Guard, Mode, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.system.growth import Finished, Place
 from hybrid.system.outputs import Formula, Output
-from hybrid.transform.contacts.cases import Happening, Written
+from hybrid.transform.contacts.cases import Happening
 from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.contacts.decide import NONE, SEQUENTIAL, SEVERAL_CASES, Decision, Judge, Undecided
 from hybrid.transform.contacts.events import BREAKS, IMPACT, JAMS, OPENS, SETTLES, STOPS, ContactEvent
@@ -35,44 +34,15 @@ from hybrid.transform.contacts.statuses import (
     mode_name,
     statuses_of,
 )
-from hybrid.transform.contacts.view import FORCES, View
-from hybrid.transform.stages import Stages, numbered
+from hybrid.transform.contacts.view import FORCES
+from hybrid.transform.deciding import Deciding, Origin, Watch
+from hybrid.transform.stages import numbered
 
 SETTLING, BEGINNING = "settles", "begins"
 # A gain of kinetic energy below this share is rounding.
 GAIN = 1e-9
 # Forces grow beyond all bounds where their equations become singular; this near, a million-fold.
 SINGULAR = 1e-6
-
-
-@attrs.define(eq=False)
-class Watch:
-    """An event that a mode looks out for, and what may happen then.
-
-    Attributes
-    ----------
-    source, now
-        The mode, by its name and by what holds there.
-    event, guard
-        What is looked out for.
-    title
-        What happens, in names of transitions.
-    cases
-        The transitions that have been made, each with its condition.
-    undecided
-        Why a run has ended here.
-    decisions
-        What these transitions stand for.
-    """
-
-    source: str
-    now: Combination
-    event: ContactEvent
-    guard: Guard
-    title: str
-    cases: list[tuple[Transition, Expression]] = attrs.field(factory=list)
-    undecided: Undecided | None = None
-    decisions: list[Decision] = attrs.field(factory=list)
 
 
 @attrs.frozen(eq=False)
@@ -84,26 +54,16 @@ class Made:
     watches: list[Watch]
 
 
-@attrs.frozen(eq=False)
-class Origin:
-    """The call that has made a system: copies are made by it."""
-
-    make: Callable[..., HybridSystem]
-    called: Mapping[str, Any]
-
-
-class ContactGrowth(Stages):
+class ContactGrowth(Deciding):
     """Makes the modes of a mechanical system and the transitions between them, as runs need them."""
 
     def __init__(
         self, judge: Judge, original: HybridSystem, origin: Origin, start: str | None = None
     ) -> None:
-        super().__init__()
-        self.judge, self.original, self.origin, self.start = judge, original, origin, start
-        self.called = origin.called
+        super().__init__(original, origin)
+        self.judge, self.start = judge, start
         self.mechanics = judge.mechanics
         self.made: dict[Combination, Made] = {}
-        self.why: dict[str, str] = {}
         self.notes: dict[str, None] = {}
         self.doubtful: dict[str, str] = {}
         self.starts = Starts(self.mechanics, judge.together)
@@ -126,54 +86,26 @@ class ContactGrowth(Stages):
         self.still = expressed([ZERO] * sample.dimension)
 
     @property
-    def told(self) -> Mapping[str, str]:
-        """By transition: why a run ends there, in words."""
-        return self.why
-
-    @property
     def ambiguous(self) -> Mapping[str, str]:
         """Impacts whose order would matter, each with the names of the contacts."""
         return self.doubtful
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _made_again, (self.origin.make, self.origin.called)
 
     @property
     def contacts(self) -> list[Contact]:
         """What the author gave."""
         return [each.contact for each in self.mechanics.contacts]
 
-    def extend(self, transition: str, place: Place, known: Collection[str]) -> bool:
-        """Make what happens at the end of a run; False if nothing can: the run ends there."""
-        with self.lock:
-            watch = self.frontier[transition]
-            decision = self._decided(watch, place)
-            if isinstance(decision, Undecided):
-                watch.undecided = decision
-                self.why[transition] = self._why(watch, decision, self.mechanics.at(*place))
-                ends = self._frontier_name(watch, decision.name) in known
-                self.stage = self.stage if ends else None
-                return not ends
-            if decision in watch.decisions:
-                made, _ = watch.cases[watch.decisions.index(decision)]
-                if made.name not in known:
-                    return True
-                # It holds in numbers and not in the compiled code: all depends on rounding.
-                self.why[transition] = "What happens there depends on rounding."
-                return False
-            for each in self._alike(watch, decision):
-                if decision not in each.decisions:
-                    self._write(each, decision, place)
-            self._remark(watch, decision, place)
-            self.stage = None
-            return True
-
     def _decided(self, watch: Watch, place: Place) -> Decision | Undecided:
-        """What happens at an event."""
         if watch.event.kind != JAMS:
             return self.judge.decide(watch.event, watch.now, *place)
         closed = tuple(i for i, each in enumerate(watch.now.statuses) if each != OPEN)
         return Undecided(NONE, closed, False)
+
+    def _follow(self, watch: Watch, decision: Decision, place: Place) -> None:
+        for each in self._alike(watch, decision):
+            if decision not in each.decisions:
+                self._write(each, decision, place)
+        self._remark(watch, decision, place)
 
     def _remark(self, watch: Watch, decision: Decision, place: Place) -> None:
         """Note what is doubtful about an impact: the order of several, a gain of energy."""
@@ -242,7 +174,9 @@ class ContactGrowth(Stages):
             t, x, parameters = place
             after = Program(case.state).run(self.mechanics.space.values(t, x, parameters))
             place = t, np.array(after, dtype=float), parameters
-        self._add(watch, decision, case, self._make(decision.target(len(self.contacts)), place))
+        to = self._make(decision.target(len(self.contacts)), place).mode.name
+        limit = SETTLING if watch.event.kind == IMPACT else None
+        self._add(watch, case, to, self._title(watch, decision), limit)
 
     def place(self, t: float, x: np.ndarray, parameters: np.ndarray, mode: str | None) -> bool:
         """Make the mode in which a run starts; whether it was to be made.
@@ -341,24 +275,6 @@ class ContactGrowth(Stages):
     def _gaps(self) -> list[Guard]:
         return [Guard(scalar(each), -1) for each in self.mechanics.view.gaps]
 
-    def _add(self, watch: Watch, decision: Decision, case: Written, target: Made) -> None:
-        """Make the transition of a case."""
-        condition: Expression = reduce(And, case.conditions) if case.conditions else Number(1)
-        asked = reduce(And, (Not(each) for _, each in watch.cases), condition)
-        reset = None if case.state is None else Reset(expressed(case.state))
-        title = self._title(watch, decision)
-        to = target.mode.name
-        transition = Transition(
-            watch.source,
-            to,
-            attrs.evolve(watch.guard, when=None if asked == 1 else scalar(asked)),
-            reset,
-            accumulates_to=SETTLING if watch.event.kind == IMPACT else None,
-            name=self._unused(f"{watch.source}->{to} by {title}"),
-            part_of=title,
-        )
-        watch.cases.append((transition, condition))
-
     def _title(self, watch: Watch, decision: Decision) -> str:
         """What happens, in names of transitions."""
         if watch.event.kind == IMPACT:
@@ -367,10 +283,6 @@ class ContactGrowth(Stages):
         if watch.event.kind == BREAKS and is_shared(decision.forces, watch.now.of_closed(decision.resting)):
             return f"{self.contacts[watch.event.contact].name} shares"
         return watch.title
-
-    def _unused(self, name: str) -> str:
-        used = {each.name for watch in self._all_watches() for each, _ in watch.cases}
-        return next(each for each in numbered(name) if each not in used)
 
     def _all_watches(self) -> Iterator[Watch]:
         yield self.settling
@@ -381,17 +293,11 @@ class ContactGrowth(Stages):
 
     def _assembled(self) -> HybridSystem:
         """The system of what has been made."""
-        transitions: list[Transition] = []
-        for watch in self._all_watches():
-            transitions += [each for each, _ in watch.cases]
-            onward = self._frontier(watch)
-            if onward is not None:
-                transitions.append(onward)
         modes = [each.mode for each in self.made.values()]
         moments = [Mode(name, self.still) for name in self._moments]
         given: dict[str, Any] = {
             "modes": [*modes, *moments],
-            "transitions": transitions,
+            "transitions": self._transitions(),
             "outputs": {**self.original.outputs, **self._outputs()},
             "notes": (*self.original.notes, *self.notes),
             "growth": self,
@@ -402,21 +308,6 @@ class ContactGrowth(Stages):
     def _moments(self) -> list[str]:
         """The modes that last no time."""
         return [SETTLING, BEGINNING] if self.begins else [SETTLING]
-
-    def _frontier(self, watch: Watch) -> Transition | None:
-        """The transition that ends a run where none of the cases that have been made holds."""
-        condition: Expression = reduce(And, (Not(each) for _, each in watch.cases), Number(1))
-        if condition == 0:
-            return None
-        part = watch.title if watch.undecided is None else watch.undecided.name
-        name = self._frontier_name(watch, part)
-        guard = attrs.evolve(watch.guard, when=None if condition == 1 else scalar(condition))
-        return Transition(watch.source, None, guard, name=name, part_of=part)
-
-    def _frontier_name(self, watch: Watch, part: str) -> str:
-        """A name that stays: a run in another thread may still be on an earlier stage."""
-        first = part if watch.undecided is not None else f"{watch.source}: {part}"
-        return next(each for each in numbered(first) if self.frontier.setdefault(each, watch) is watch)
 
     def _outputs(self) -> dict[str, Output]:
         """Gap and forces of each contact, in the modes that have been made."""
@@ -436,8 +327,8 @@ class ContactGrowth(Stages):
             found[gap] = Output(gap, (Formula(None, self._gaps[i].function),))
         return found
 
-    def _why(self, watch: Watch, undecided: Undecided, view: View) -> str:
-        """Why a run ends where nothing is decided."""
+    def _why(self, watch: Watch, undecided: Undecided, place: Place) -> str:
+        view = self.mechanics.at(*place)
         names = ", ".join(repr(self.contacts[i].name) for i in undecided.contacts)
         what = "impulses" if undecided.sudden else "accelerations"
         friction = ", ".join(
@@ -460,13 +351,6 @@ class ContactGrowth(Stages):
                 statuses[i] = status
             names.append(repr(mode_name(self.contacts, tuple(statuses))))
         return " or ".join(names)
-
-
-def _made_again(make: Callable[..., HybridSystem], called: Mapping[str, Any]) -> ContactGrowth:
-    """The growth of a system that has been pickled."""
-    growth = make(**called).growth
-    assert isinstance(growth, ContactGrowth), "the call makes a system that grows"
-    return growth
 
 
 def contacts_of(system: HybridSystem) -> ContactGrowth | None:
