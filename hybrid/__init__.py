@@ -60,9 +60,11 @@ from hybrid.system.graph import HybridSystem
 from hybrid.system.laws import Laws
 from hybrid.system.repeat import repeat
 from hybrid.system.schedule import At
+from hybrid.transform.complementarity import complementarity
 from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.filippov import filippov
 from hybrid.transform.mechanics import mechanics
+from hybrid.transform.pairs.pair import Pair
 from hybrid.transform.split import from_equations, split
 
 __version__ = "0.1.0"
@@ -101,6 +103,7 @@ __all__ = [
     "Laws",
     "Mode",
     "ModelError",
+    "Pair",
     "PeriodicOrbit",
     "RadauIIA",
     "Reset",
@@ -120,6 +123,7 @@ __all__ = [
     "basin_fractions",
     "basins",
     "compile_system",
+    "complementarity",
     "continue_all",
     "continue_bifurcation",
     "continue_equilibrium",

@@ -20,8 +20,9 @@ from hybrid.system.members import is_component_name, member_name, shared_names, 
 
 STATE = "State components"
 PARAMETERS = "Parameters"
+PAIRS = "Pairs"
 # What model functions call them.
-LETTERS = {STATE: "x", PARAMETERS: "p"}
+LETTERS = {STATE: "x", PARAMETERS: "p", PAIRS: "z"}
 MOST_COMPONENTS = 1_000_000
 # Number of named-value classes kept for later models with the same names.
 MOST_CLASSES = 256

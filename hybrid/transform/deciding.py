@@ -59,6 +59,8 @@ class Watch:
         What is looked out for.
     title
         What happens, in names of transitions.
+    asked
+        What has to hold for the event to count.
     cases
         The transitions that have been made, each with its condition.
     undecided
@@ -72,6 +74,7 @@ class Watch:
     event: Any
     guard: Guard | Clock
     title: str
+    asked: Expression = Number(1)
     cases: list[tuple[Transition, Expression]] = attrs.field(factory=list)
     undecided: Any = None
     decisions: list[Any] = attrs.field(factory=list)
@@ -144,7 +147,7 @@ class Deciding(Stages):
     ) -> None:
         """Make the transition of a case to a mode."""
         condition: Expression = reduce(And, written.conditions) if written.conditions else Number(1)
-        asked = reduce(And, (Not(each) for _, each in watch.cases), condition)
+        asked = reduce(And, (Not(each) for _, each in watch.cases), And(watch.asked, condition))
         transition = Transition(
             watch.source,
             target,
@@ -172,7 +175,7 @@ class Deciding(Stages):
 
     def _frontier(self, watch: Watch) -> Transition | None:
         """The transition that ends a run where none of the cases that have been made holds."""
-        condition: Expression = reduce(And, (Not(each) for _, each in watch.cases), Number(1))
+        condition: Expression = reduce(And, (Not(each) for _, each in watch.cases), watch.asked)
         if condition == 0:
             return None
         part = watch.title if watch.undecided is None else watch.undecided.name

@@ -1,0 +1,191 @@
+"""Which pairs are active at a state: all cases are tried, so that none and several are seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+
+import attrs
+import numpy as np
+
+from hybrid.expression.evaluation import Program
+from hybrid.expression.graph import all_replaced
+from hybrid.expression.nodes import ZERO, Expression
+from hybrid.system.growth import Place
+from hybrid.transform.deciding import NothingDecided, Written
+from hybrid.transform.linear import Vector
+from hybrid.transform.pairs.equations import Equations, Sides, values_at
+from hybrid.transform.pairs.noise import NOISE, Manifold, at_first, not_negative, size_of, vanishing
+from hybrid.transform.pairs.regime import Regime, is_far, regime_of, shape_of
+
+NO_SOLUTION, NOT_UNIQUE = "no solution", "not unique"
+# Cases whose rates differ by more than this share of their terms are several.
+SEVERAL = 1e-6
+
+
+@attrs.frozen
+class Decision:
+    """What follows an event.
+
+    Attributes
+    ----------
+    sides
+        What clocks have switched.
+    kicked
+        The pairs that have impulses, and others whose ``w`` these keep at zero; None without impulses.
+    active
+        The pairs whose ``z`` may be positive afterwards.
+    """
+
+    sides: Sides
+    kicked: tuple[int, ...] | None
+    active: tuple[int, ...]
+
+
+@attrs.frozen
+class Undecided(NothingDecided):
+    """Why nothing is decided: ``no solution``, or ``not unique`` with the active pairs of each solution."""
+
+    sides: Sides
+    cases: tuple[tuple[int, ...], ...] = ()
+
+
+class Judge:
+    """Decides which pairs are active."""
+
+    def __init__(self, equations: Equations) -> None:
+        self.equations = equations
+        self._regimes: dict[tuple[Sides, tuple[int, ...]], Regime] = {}
+        self._programs: dict[Expression, Program] = {}
+
+    def cases(self) -> Iterator[tuple[int, ...]]:
+        """All sets of pairs, small ones first."""
+        count = len(self.equations.pairs)
+        for size in range(count + 1):
+            yield from combinations(range(count), size)
+
+    def regime(self, sides: Sides, active: tuple[int, ...], place: Place) -> Regime | None:
+        """The motion with these pairs active; None if neither their ``w`` nor its rate tells ``z``."""
+        if (sides, active) not in self._regimes:
+            configuration = self.equations.configuration(sides)
+            shape = shape_of(configuration.at(place), active)
+            if shape is None:
+                return None
+            self._regimes[sides, active] = regime_of(configuration, shape, place)
+        return self._regimes[sides, active]
+
+    def manifold(self, zero: Sequence[Expression], place: Place) -> Manifold:
+        """The points around a state at which expressions are zero."""
+        return Manifold(self.equations.symbols, zero, place)
+
+    def kinds(self, sides: Sides, place: Place, manifold: Manifold) -> list[list[Regime]]:
+        """The motions that may go on from a state; those of one kind differ in ``z`` and ``w`` alone."""
+        found: list[list[Regime]] = []
+        numbers = self.equations.configuration(sides).at(place)
+        for active in self.cases():
+            shape = shape_of(numbers, active)
+            if shape is None or is_far(numbers, shape):
+                continue
+            regime = self.regime(sides, active, place)
+            if regime is None or not self._goes_on(regime, place, manifold):
+                continue
+            alike = next((kind for kind in found if self._is_alike(kind[0], regime, place)), None)
+            if alike is None:
+                found.append([regime])
+            else:
+                alike.append(regime)
+        return found
+
+    def _goes_on(self, regime: Regime, place: Place, manifold: Manifold) -> bool:
+        for each in regime.holds:
+            value, size = (0.0, 0.0) if manifold.has(each) else self._valued(each, place)
+            if not abs(value) <= NOISE * size:
+                return False
+        return all(self._is_first(regime.levels(i), place, manifold) for i in regime.asked)
+
+    def _is_first(self, levels: Vector, place: Place, manifold: Manifold) -> bool:
+        """Whether something is not negative from now on."""
+        for each in levels:
+            if manifold.has(each):
+                continue
+            value, size = self._valued(each, place)
+            if not abs(value) <= NOISE * size:
+                return value > 0.0
+        return True
+
+    def _valued(self, expression: Expression, place: Place) -> tuple[float, float]:
+        """A value, and the size of its terms."""
+        if expression not in self._programs:
+            self._programs[expression] = Program([expression, size_of(expression)])
+        value, size = values_at(self.equations.symbols, self._programs[expression], place)
+        return float(value), float(size)
+
+    def _is_alike(self, one: Regime, other: Regime, place: Place) -> bool:
+        """Whether two motions are the same, by their rates and the rates of these."""
+        return all(self._agree(a, b, place) for a, b in zip(one.speeds, other.speeds, strict=True))
+
+    def _agree(self, one: Expression, other: Expression, place: Place) -> bool:
+        (a, a_size), (b, b_size) = (self._valued(each, place) for each in (one, other))
+        return abs(a - b) <= SEVERAL * (a_size + b_size)
+
+    def decide(self, sides: Sides, place: Place, manifold: Manifold) -> Decision | Undecided:
+        """What follows at a state."""
+        kinds = self.kinds(sides, place, manifold)
+        if len(kinds) == 1:
+            return Decision(sides, None, kinds[0][0].active)
+        if kinds:
+            return Undecided(NOT_UNIQUE, sides, tuple(kind[0].active for kind in kinds))
+        jumps = [*self._jumps(sides, place)]
+        first = jumps[:1]
+        for decision, after in jumps[1:]:
+            if not np.allclose(after, first[0][1], rtol=SEVERAL, atol=SEVERAL * np.abs(after).max()):
+                return Undecided(NOT_UNIQUE, sides, (first[0][0].active, decision.active))
+        return first[0][0] if first else Undecided(NO_SOLUTION, sides)
+
+    def _jumps(self, sides: Sides, place: Place) -> Iterator[tuple[Decision, np.ndarray]]:
+        """What may follow if impulses bring the state to where ``w`` is not negative."""
+        t, _, parameters = place
+        for kicked in self.cases():
+            regime = self.regime(sides, kicked, place) if kicked else None
+            if regime is None or not regime.holds:
+                continue
+            asked = (self._valued(each, place) for each in (*regime.impulses, *regime.kicks))
+            if not all(value >= -NOISE * size for value, size in asked):
+                continue
+            after = values_at(self.equations.symbols, Program(regime.state), place)
+            there = t, after, parameters
+            if not np.isfinite(after).all():
+                continue
+            kinds = self.kinds(sides, there, self.manifold(regime.holds, there))
+            for kind in kinds:
+                yield Decision(sides, kicked, kind[0].active), after
+
+    def written(self, decision: Decision, place: Place, manifold: Manifold, held: Vector) -> Written:
+        """A decision as expressions; ``held`` is what is zero before, beside what the event says."""
+        x = self.equations.symbols.x
+        state: Vector = [*x]
+        conditions: list[Expression] = []
+        if decision.kicked is not None:
+            kick = self._regime(decision.sides, decision.kicked, place)
+            wanted = (each for each in (*kick.impulses, *kick.kicks) if each is not ZERO)
+            conditions += map(not_negative, wanted)
+            state, t, parameters = kick.state, place[0], place[2]
+            place = t, values_at(self.equations.symbols, Program(state), place), parameters
+            manifold = self.manifold(kick.holds, place)
+        regime = self._regime(decision.sides, decision.active, place)
+        after = dict(zip(x, state, strict=True))
+        going_on = [vanishing(each) for each in regime.holds if not manifold.has(each)]
+        for i in regime.asked:
+            levels = [each for each in regime.levels(i) if not manifold.has(each)]
+            going_on += [at_first(levels)] if levels else []
+        conditions += all_replaced(going_on, after)
+        is_held = self.manifold(held, place).has if decision.kicked is None else manifold.has
+        if decision.kicked is not None or not all(map(is_held, regime.holds)):
+            drawn = regime.state if not all(map(is_held, regime.holds)) else [*x]
+            return Written(conditions, all_replaced(drawn, after))
+        return Written(conditions, None)
+
+    def _regime(self, sides: Sides, active: tuple[int, ...], place: Place) -> Regime:
+        found = self.regime(sides, active, place)
+        assert found is not None, "the decision has been made with it"
+        return found

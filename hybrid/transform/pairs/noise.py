@@ -1,0 +1,122 @@
+"""What counts as zero: in numbers by the sizes of terms, and as an expression where others are zero."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import reduce
+from typing import Any
+
+import numpy as np
+
+from hybrid.expression.derivatives import jacobian_of
+from hybrid.expression.evaluation import Program
+from hybrid.expression.nodes import ZERO, Expression, Number, add, multiply, power
+from hybrid.expression.operations import Absolute, And, Less, LessEqual, Or
+from hybrid.system.growth import Place
+from hybrid.transform.pairs.equations import values_at
+
+# What is smaller than this share of its terms is zero: it has been computed with rounding.
+NOISE = 1e-9
+# Points at which an expression has to vanish, how far around a state, and the steps of Newton's method.
+POINTS, AROUND, MOST_STEPS = 4, 0.3, 20
+
+
+def size_of(expression: Expression) -> Expression:
+    """The sum of the sizes of the terms of an expression."""
+    if expression.is_sum:
+        return add(*map(size_of, expression.args))
+    if expression.is_product:
+        return multiply(*map(size_of, expression.args))
+    if expression.is_power and isinstance(expression.args[1], Number) and expression.args[1].value > 0:
+        return power(size_of(expression.args[0]), expression.args[1])
+    return Absolute(expression)
+
+
+def not_negative(expression: Expression) -> Expression:
+    """The condition that an expression is not negative by more than its noise."""
+    return LessEqual(-NOISE * size_of(expression), expression)
+
+
+def vanishing(expression: Expression) -> Expression:
+    """The condition that an expression is zero but for its noise."""
+    return LessEqual(Absolute(expression), NOISE * size_of(expression))
+
+
+def at_first(levels: Sequence[Expression]) -> Expression:
+    """The condition that something is not negative from now on, by its value and its derivatives in time.
+
+    The first of these that is not zero decides.
+    """
+    *first, last = levels
+    return reduce(
+        lambda later, each: Or(Less(NOISE * size_of(each), each), And(not_negative(each), later)),
+        reversed(first),
+        not_negative(last),
+    )
+
+
+class Manifold:
+    """The points around a state at which some expressions are zero.
+
+    A run that has come there has them zero but for rounding, of which neither value nor size tells anything.
+    So what is zero on the whole manifold is known to be zero.
+
+    Parameters
+    ----------
+    symbols
+        Those of the model.
+    zero
+        The expressions.
+    """
+
+    def __init__(self, symbols: Any, zero: Sequence[Expression], place: Place) -> None:
+        self.symbols, self.zero = symbols, tuple(each for each in zero if each is not ZERO)
+        t, x, parameters = place
+        rng = np.random.default_rng(20240507)
+        scale = np.where(x == 0.0, 1.0, np.abs(x))
+        self.known: dict[Expression, bool] = {each: True for each in self.zero}
+        self.points: list[tuple[Place, np.ndarray]] = []
+        for _ in range(POINTS):
+            there = x + AROUND * scale * rng.uniform(-1.0, 1.0, len(x))
+            # Parameters that happen to be equal, or zero, should not count as such.
+            values = parameters * (1.0 + AROUND * rng.uniform(-1.0, 1.0, len(parameters)))
+            values = np.where(parameters == 0.0, rng.uniform(0.5, 1.0, len(parameters)), values)
+            point = self._onto((t + AROUND * max(abs(t), 1.0) * rng.uniform(), there, values), scale)
+            if point is not None:
+                self.points.append((point, np.append(np.abs(there) + scale, max(abs(t), 1.0))))
+
+    def _onto(self, place: Place, scale: np.ndarray) -> Place | None:
+        """A point of the manifold, by Newton's method; None if it finds none."""
+        t, x, parameters = place
+        units = np.append(scale, max(abs(t), 1.0))
+        program = self._with_slopes(self.zero)
+        for _ in range(MOST_STEPS if self.zero else 0):
+            values = values_at(self.symbols, program, (t, x, parameters)).reshape(len(self.zero), -1)
+            value, slopes = values[:, 0], values[:, 1:] * units
+            if not np.isfinite(values).all():
+                return None
+            step = units * np.linalg.lstsq(slopes, -value, rcond=None)[0]
+            t, x = t + float(step[-1]), x + step[:-1]
+            if (np.abs(step) <= 1e-14 * units).all():
+                break
+        return t, x, parameters
+
+    def has(self, expression: Expression) -> bool:
+        """Whether an expression vanishes on the manifold."""
+        if expression not in self.known:
+            program = self._with_slopes([expression, size_of(expression)])
+            self.known[expression] = bool(self.points) and all(
+                self._is_zero(program, *each) for each in self.points
+            )
+        return self.known[expression]
+
+    def _is_zero(self, program: Program, place: Place, scale: np.ndarray) -> bool:
+        values = values_at(self.symbols, program, place)
+        value, slopes, size = values[0], values[1 : len(scale) + 1], values[len(scale) + 1]
+        largest = size + np.abs(slopes) @ scale
+        return bool(np.isfinite(largest)) and abs(value) <= NOISE * largest
+
+    def _with_slopes(self, expressions: Sequence[Expression]) -> Program:
+        """Each expression with its derivatives in the state and in time."""
+        rows = jacobian_of(expressions, self.symbols.variables)
+        return Program([each for value, row in zip(expressions, rows, strict=True) for each in (value, *row)])
