@@ -24,6 +24,7 @@ from hybrid.testing.errors import PropertyError
 from hybrid.testing.starts import nearest_zero, start_in
 from hybrid.testing.symmetry import is_mirrored
 from hybrid.transform.contacts.growth import contacts_of
+from hybrid.transform.deciding import decided_by
 
 FIRES = "Every guard can fire, and no condition refuses every crossing"
 # States are also drawn from the ranges times powers of ten between these.
@@ -82,11 +83,11 @@ class Coverage:
         """Nothing seen yet of a system."""
         # A transition at the start corrects the mode of a start, and drawn starts need none.
         flown = [each for each in system.transitions if not each.guard.at_start]
-        growth = contacts_of(system)
-        if growth is not None:
+        if decided_by(system) is not None:
             # Modes and transitions are made when runs need them, so none is missed; a contact may be.
-            contacts = Counter({IMPACTS_OF.format(each.name): 0 for each in growth.contacts})
-            return cls(system, contacts, Counter(), Counter(), Counter())
+            growth = contacts_of(system)
+            names = [] if growth is None else [IMPACTS_OF.format(each.name) for each in growth.contacts]
+            return cls(system, Counter(dict.fromkeys(names, 0)), Counter(), Counter(), Counter())
         conditional = [each.name for each in flown if each.guard.when is not None and _is_users(each)]
         zeros = ([each.name for each in flown], system.mode_names, conditional)
         jumps, visits, refused = (Counter(dict.fromkeys(names, 0)) for names in zeros)
@@ -149,7 +150,7 @@ class Coverage:
     def dead_ends(self) -> tuple[str, ...]:
         """Modes that nothing leaves though the state moves there, that nothing enters, that never last."""
         system = self.system
-        if contacts_of(system) is not None:
+        if decided_by(system) is not None:
             return ()
         left = {each.source for each in system.transitions}
         entered = {name for each in system.transitions for name in (each.target, each.accumulates_to)}

@@ -21,6 +21,7 @@ from hybrid.testing.errors import PropertyError, discard
 from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.contacts.growth import contacts_of
 from hybrid.transform.contacts.statuses import FREE
+from hybrid.transform.pairs.growth import pairs_of
 
 DIMENSIONS = "The units of every function fit"
 
@@ -241,7 +242,7 @@ def _wanted(system: HybridSystem) -> Iterator[tuple[str, Callable[..., Any], dic
     """Each function of ``(t, x, p)`` with its title, and with the names and the units of its values."""
     time = Quantity(unit_of(system.units["t"]))
     state = {name: Quantity(unit_of(system.units[name])) for name in system.state_names}
-    growth = contacts_of(system)
+    growth, pairs = contacts_of(system), pairs_of(system)
     if growth is not None:
         yield from _of_contacts(system, growth.contacts, time)
     for _, function in functions_of(system):
@@ -251,13 +252,16 @@ def _wanted(system: HybridSystem) -> Iterator[tuple[str, Callable[..., Any], dic
         if function.kind == "reset" and is_of_library(function.function):
             # The projection onto a surface, whose gradient may have components of several units.
             continue
-        kind, wanted = function.kind, {}
+        kind, wanted, value = function.kind, {}, function.value
         if kind == "field":
             wanted = {f"the derivative of {name}": _product(unit, time, -1) for name, unit in state.items()}
         elif kind == "reset":
             wanted = {f"the new {name}": unit for name, unit in state.items()}
         title = "condition" if kind == CONDITION else kind
-        yield f"{title} of {function.owner[0].lower()}{function.owner[1:]}", function.value, wanted
+        if kind == "field" and pairs is not None:
+            # What draws a state back has the pace of the motion as a number.
+            value = pairs.field_of(function.owner)
+        yield f"{title} of {function.owner[0].lower()}{function.owner[1:]}", value, wanted
     derived = {} if growth is None else growth.mechanics.outputs
     for name, output in system.outputs.items():
         if name in derived:

@@ -16,7 +16,7 @@ from hybrid.system.elements import Reset, Transition
 from hybrid.system.functions import WholeReset, field_function
 from hybrid.system.graph import HybridSystem, as_system, functions_of, laws_of, watched_below, watched_by
 from hybrid.testing.errors import PropertyError, discard
-from hybrid.transform.contacts.growth import contacts_of
+from hybrid.transform.deciding import decided_by
 
 READS = "Every parameter is read, and no number stands in for one"
 _PASSED: WeakKeyDictionary[HybridSystem, dict[str, bool]] = WeakKeyDictionary()
@@ -112,7 +112,7 @@ def check_reads(system: HybridSystem) -> None:
 
 def numbers_read(system: HybridSystem) -> dict[str, float]:
     """The plain numbers that the functions read from modules and closures, by name."""
-    watched = watched_by if contacts_of(system) is None else watched_below
+    watched = watched_by if decided_by(system) is None else watched_below
     return watched(system).numbers()
 
 
@@ -126,10 +126,10 @@ def _all_functions(system: HybridSystem) -> list[Callable[..., Any]]:
         found += law.formulas
     for output in system.outputs.values():
         found += output.functions
-    growth = contacts_of(system)
+    growth = decided_by(system)
     if growth is not None:
         # Modes are made when runs need them, and each reads some of this.
-        found.append(expressed(growth.mechanics.given))
+        found.append(expressed(growth.given))
     for law in laws.across:
         found.append(lambda t, x, p, law=law: law.quantity(t, x, x, p))
     return found

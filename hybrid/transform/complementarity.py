@@ -39,9 +39,9 @@ def complementarity(
     """The hybrid system of equations with ideal diodes, or with other pairs of which one is zero.
 
     The equations are ``x' = f(t, x, z, p)`` and ``w = g(t, x, z, p)``, both affine in ``z``, and for each
-    pair ``w >= 0``, ``z >= 0`` and ``w z = 0``. Which ``z`` are positive, when that changes and what the state
-    does then is derived. The result is an ordinary `HybridSystem`, whose modes are made when a run first
-    needs them.
+    pair ``w >= 0``, ``z >= 0`` and ``w z = 0``. Which ``z`` are positive, when that changes and what the
+    state does then is derived. The result is an ordinary `HybridSystem`, whose modes are made when a run
+    first needs them.
 
     Parameters
     ----------
@@ -60,10 +60,11 @@ def complementarity(
     -------
     HybridSystem
         Modes are named by the pairs whose ``z`` may be positive: ``free``, ``d1``, ``d1+d3``; behind what
-        clocks have switched, as in ``on: d1``. Outputs ``d1.w`` and ``d1.z`` are the two quantities of a pair.
-        ``arc.jumps["d1.w"]`` are the instants at which ``w`` of a pair becomes zero. A run ends (TERMINAL)
-        with a jump ``no solution`` where no ``z`` keeps all ``w`` from becoming negative, and with
-        ``not unique`` where several motions agree with all pairs.
+        clocks have switched, as in ``on: d1``. Outputs ``d1.w`` and ``d1.z`` are the two quantities of a
+        pair. ``arc.jumps["d1.w"]`` are the instants at which ``w`` of a pair becomes zero; where those of
+        several do together, the name is that of all, ``d1.w, d3.z``. A run ends (TERMINAL) with a jump ``no
+        solution`` where no ``z`` keeps all ``w`` from becoming negative, and with ``not unique`` where
+        several motions agree with all pairs.
 
     Raises
     ------

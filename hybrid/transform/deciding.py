@@ -15,12 +15,12 @@ from typing import Any
 import attrs
 
 from hybrid.expression.evaluation import expressed, scalar
-from hybrid.expression.nodes import Expression, Number
+from hybrid.expression.nodes import ONE, Expression
 from hybrid.expression.operations import And, Not
 from hybrid.system.clocks import Clock
 from hybrid.system.elements import Guard, Reset, Transition
 from hybrid.system.graph import HybridSystem
-from hybrid.system.growth import Place
+from hybrid.system.growth import Finished, Place
 from hybrid.transform.stages import Stages, numbered
 
 
@@ -74,7 +74,7 @@ class Watch:
     event: Any
     guard: Guard | Clock
     title: str
-    asked: Expression = Number(1)
+    asked: Expression = ONE
     cases: list[tuple[Transition, Expression]] = attrs.field(factory=list)
     undecided: Any = None
     decisions: list[Any] = attrs.field(factory=list)
@@ -126,6 +126,11 @@ class Deciding(Stages):
             self.stage = None
             return True
 
+    @property
+    @abstractmethod
+    def given(self) -> list[Expression]:
+        """What the author gives; each mode reads some of it."""
+
     @abstractmethod
     def _decided(self, watch: Watch, place: Place) -> Any:
         """What happens at an event, or `NothingDecided`."""
@@ -146,7 +151,7 @@ class Deciding(Stages):
         self, watch: Watch, written: Written, target: str, title: str, accumulates_to: str | None = None
     ) -> None:
         """Make the transition of a case to a mode."""
-        condition: Expression = reduce(And, written.conditions) if written.conditions else Number(1)
+        condition: Expression = reduce(And, written.conditions) if written.conditions else ONE
         asked = reduce(And, (Not(each) for _, each in watch.cases), And(watch.asked, condition))
         transition = Transition(
             watch.source,
@@ -194,3 +199,10 @@ def _made_again(make: Callable[..., HybridSystem], called: Mapping[str, Any]) ->
     growth = make(**called).growth
     assert isinstance(growth, Deciding), "the call makes a system that grows"
     return growth
+
+
+def decided_by(system: HybridSystem) -> Deciding | None:
+    """What decides the transitions of a system, or decided those that it has; None for other systems."""
+    growth = system.growth
+    made_by = growth.of if isinstance(growth, Finished) else growth
+    return made_by if isinstance(made_by, Deciding) else None

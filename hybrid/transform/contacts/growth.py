@@ -12,10 +12,10 @@ import numpy as np
 from hybrid.errors import ArgumentError
 from hybrid.expression.evaluation import Program, expressed, scalar
 from hybrid.expression.linear import dot
-from hybrid.expression.nodes import ZERO, Number, node
+from hybrid.expression.nodes import ONE, ZERO, Expression, node
 from hybrid.system.elements import Guard, Mode, Transition
 from hybrid.system.graph import HybridSystem
-from hybrid.system.growth import Finished, Place
+from hybrid.system.growth import Place
 from hybrid.system.outputs import Formula, Output
 from hybrid.transform.contacts.cases import Happening
 from hybrid.transform.contacts.contact import Contact
@@ -35,7 +35,7 @@ from hybrid.transform.contacts.statuses import (
     statuses_of,
 )
 from hybrid.transform.contacts.view import FORCES
-from hybrid.transform.deciding import Deciding, Origin, Watch
+from hybrid.transform.deciding import Deciding, Origin, Watch, decided_by
 from hybrid.transform.stages import numbered
 
 SETTLING, BEGINNING = "settles", "begins"
@@ -69,7 +69,7 @@ class ContactGrowth(Deciding):
         self.starts = Starts(self.mechanics, judge.together)
         self.begins = False
         count = len(self.mechanics.contacts)
-        always = Guard(scalar(Number(1)), +1, at_start=True)
+        always = Guard(scalar(ONE), +1, at_start=True)
         nothing = Combination.of([OPEN] * count)
         self.beginning = Watch(BEGINNING, nothing, ContactEvent(IMPACT), always, "begin")
         self.settling = Watch(
@@ -89,6 +89,11 @@ class ContactGrowth(Deciding):
     def ambiguous(self) -> Mapping[str, str]:
         """Impacts whose order would matter, each with the names of the contacts."""
         return self.doubtful
+
+    @property
+    def given(self) -> list[Expression]:
+        """Masses, forces, gaps, slips and coefficients."""
+        return self.mechanics.given
 
     @property
     def contacts(self) -> list[Contact]:
@@ -355,6 +360,5 @@ class ContactGrowth(Deciding):
 
 def contacts_of(system: HybridSystem) -> ContactGrowth | None:
     """What makes the modes of a system with contacts, or made those that it has; None for other systems."""
-    growth = system.growth
-    made_by = growth.of if isinstance(growth, Finished) else growth
-    return made_by if isinstance(made_by, ContactGrowth) else None
+    found = decided_by(system)
+    return found if isinstance(found, ContactGrowth) else None

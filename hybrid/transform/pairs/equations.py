@@ -14,6 +14,7 @@ from hybrid.errors import ModelError
 from hybrid.expression.derivatives import directional, jacobian_of
 from hybrid.expression.evaluation import Program
 from hybrid.expression.graph import all_replaced, mentions, nodes_of
+from hybrid.expression.linear import Vector
 from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol
 from hybrid.expression.surfaces import Surfaces
 from hybrid.expression.switches import Switches
@@ -22,7 +23,6 @@ from hybrid.expression.tracing import TraceError, model_symbols, trace
 from hybrid.system.clocks import Every
 from hybrid.system.growth import Place
 from hybrid.system.variables import PAIRS, STATE, Variables, named_values
-from hybrid.transform.linear import Vector
 from hybrid.transform.naming import Names
 from hybrid.transform.pairs.pair import Pair
 from hybrid.transform.ticks import Timed, timed
@@ -123,7 +123,8 @@ class Equations:
         self.symbols = model_symbols(variables.dimension, len(variables.parameter_names))
         self.surfaces = Surfaces(self.symbols)
         self.names = Names(variables, titles_of(modes, variables, self.surfaces))
-        self._switches = Switches(self._entries(rates), self.surfaces)
+        self.given = self._entries(rates)
+        self._switches = Switches(self.given, self.surfaces)
         self.clocks: dict[int, Timed] = {}
         self._known: dict[Sides, Configuration] = {}
         self._find_clocks()
@@ -250,9 +251,9 @@ class Equations:
             for pair, row in zip(self.pairs, D, strict=True):
                 if any(mentions(each, self.symbols.variables) for each in row):
                     raise ModelError(
-                        f"{pair.title}: w must have z with factors that do not depend on the state and change "
-                        "in time with clocks alone. Multiply w by what it is divided by, or write the "
-                        "equations with from_equations."
+                        f"{pair.title}: w must have z with factors that do not depend on the state, and "
+                        "change with clocks alone. Multiply w by what it is divided by, or write the equations "
+                        "with from_equations."
                     )
             self._known[sides] = Configuration(self.symbols, sides, a, B, q, D)
         return self._known[sides]

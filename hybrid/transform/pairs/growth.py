@@ -11,15 +11,15 @@ import numpy as np
 from hybrid.errors import ArgumentError, ModelError
 from hybrid.expression.evaluation import expressed, scalar
 from hybrid.expression.graph import mentions
+from hybrid.expression.linear import Vector
 from hybrid.expression.nodes import ZERO, Expression, Number
 from hybrid.expression.operations import Less, LessEqual
-from hybrid.system.elements import Guard, Mode
+from hybrid.system.elements import Function, Guard, Mode
 from hybrid.system.graph import HybridSystem
 from hybrid.system.growth import Place
 from hybrid.system.outputs import Formula, Output
-from hybrid.transform.deciding import Deciding, Origin, Watch
-from hybrid.transform.linear import Vector
-from hybrid.transform.pairs.equations import Equations, Sides
+from hybrid.transform.deciding import Deciding, Origin, Watch, decided_by
+from hybrid.transform.pairs.equations import Sides
 from hybrid.transform.pairs.judge import NO_SOLUTION, Decision, Judge, Undecided
 from hybrid.transform.pairs.noise import Manifold
 from hybrid.transform.pairs.pair import BEGINNING, active_name
@@ -72,6 +72,16 @@ class PairGrowth(Deciding):
         anywhere = 0.0, np.ones(variables.dimension), variables.defaults
         self.first = self._make((self.equations.sides_at(anywhere), ()), anywhere)
 
+    @property
+    def given(self) -> list[Expression]:
+        """The rates and ``w``, with what they have of ``z``."""
+        return self.equations.given
+
+    def field_of(self, owner: str) -> Function:
+        """The field of a mode, without what draws the state back; ``owner`` is the mode in error texts."""
+        regimes = (each.regime for each in self.made.values() if owner == f"Mode {each.mode.name!r}")
+        return expressed(next(regimes, self.first.regime).field)
+
     def _decided(self, watch: Watch, place: Place) -> Decision | Undecided:
         return self.judge.decide(self._sides_after(watch, place), place, self._manifold(watch, place))
 
@@ -95,22 +105,6 @@ class PairGrowth(Deciding):
         return [] if watch.event.kind == BEGINS else self.made[watch.now].regime.holds
 
     def _follow(self, watch: Watch, decision: Decision, place: Place) -> None:
-        for each in [*self._alike(watch, place)]:
-            if decision not in each.decisions:
-                self._write(each, decision, place)
-
-    def _alike(self, watch: Watch, place: Place) -> Iterator[Watch]:
-        """The events that happen at once: what has to be positive of several pairs is zero together."""
-        yield watch
-        if watch.event.kind == REACHES:
-            manifold, made = self._manifold(watch, place), self.made[watch.now]
-            for each in made.watches:
-                if each is not watch and each.event.kind == REACHES:
-                    if manifold.has(made.regime.levels(each.event.which)[0]):
-                        yield each
-
-    def _write(self, watch: Watch, decision: Decision, place: Place) -> None:
-        """Make the transition of a decision."""
         watch.decisions.append(decision)
         written = self.judge.written(decision, place, self._manifold(watch, place), self._held(watch))
         if watch.event.kind == BEGINS:
@@ -224,13 +218,10 @@ class PairGrowth(Deciding):
     def _watches(self, source: str, holding: Holding, regime: Regime) -> Iterator[Watch]:
         """What a mode looks out for."""
         sides, active = holding
-        for i in regime.asked:
-            asked = regime.levels(i)[0]
-            if not mentions(asked, self.equations.symbols.variables):
-                continue
-            guard = Guard(scalar(asked), -1)
-            title = f"{self.equations.pairs[i].name}.{'z' if i in active else 'w'}"
-            yield Watch(source, holding, PairEvent(REACHES, i), guard, title)
+        for together in self._together(regime):
+            names = (f"{self.equations.pairs[i].name}.{'z' if i in active else 'w'}" for i in together)
+            guard = Guard(scalar(regime.levels(together[0])[0]), -1)
+            yield Watch(source, holding, PairEvent(REACHES, together[0]), guard, ", ".join(names))
         for number, side in sides:
             title = self.equations.named(_flipped(sides, number))
             clock = self.equations.clock(number, side)
@@ -239,6 +230,21 @@ class PairGrowth(Deciding):
             [beyond] = self._at_time(((number, -side),))
             wrong = Guard(scalar(Number(-side)), -side, at_start=True)
             yield Watch(source, holding, PairEvent(TICKS, number), wrong, f"{title} at start", beyond)
+
+    def _together(self, regime: Regime) -> list[list[int]]:
+        """The pairs of which something becomes zero in a mode, in lists of those that do so together."""
+        symbols, found = self.equations.symbols, list[list[int]]()
+        first = {i: regime.levels(i)[0] for i in regime.asked}
+        moving = [i for i in regime.asked if mentions(first[i], symbols.variables)]
+        zero = {i: self.judge.manifold([*regime.holds, first[i]], regime.place) for i in moving}
+        for i in moving:
+            for each in found:
+                if zero[each[0]].has(first[i]) and zero[i].has(first[each[0]]):
+                    each.append(i)
+                    break
+            else:
+                found.append([i])
+        return found
 
     def _all_watches(self) -> Iterator[Watch]:
         if self.begins:
@@ -277,3 +283,9 @@ class PairGrowth(Deciding):
 def _flipped(sides: Sides, number: int) -> Sides:
     """The sides after a clock has ticked."""
     return tuple((each, -side if each == number else side) for each, side in sides)
+
+
+def pairs_of(system: HybridSystem) -> PairGrowth | None:
+    """What makes the modes of a system of pairs, or made those that it has; None for other systems."""
+    found = decided_by(system)
+    return found if isinstance(found, PairGrowth) else None

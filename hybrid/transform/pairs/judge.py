@@ -10,10 +10,10 @@ import numpy as np
 
 from hybrid.expression.evaluation import Program
 from hybrid.expression.graph import all_replaced
+from hybrid.expression.linear import Vector
 from hybrid.expression.nodes import ZERO, Expression
 from hybrid.system.growth import Place
 from hybrid.transform.deciding import NothingDecided, Written
-from hybrid.transform.linear import Vector
 from hybrid.transform.pairs.equations import Equations, Sides, values_at
 from hybrid.transform.pairs.noise import NOISE, Manifold, at_first, not_negative, size_of, vanishing
 from hybrid.transform.pairs.regime import Regime, is_far, regime_of, shape_of

@@ -74,7 +74,7 @@ class Manifold:
         t, x, parameters = place
         rng = np.random.default_rng(20240507)
         scale = np.where(x == 0.0, 1.0, np.abs(x))
-        self.known: dict[Expression, bool] = {each: True for each in self.zero}
+        self.known: dict[Expression, bool] = dict.fromkeys(self.zero, True)
         self.points: list[tuple[Place, np.ndarray]] = []
         for _ in range(POINTS):
             there = x + AROUND * scale * rng.uniform(-1.0, 1.0, len(x))

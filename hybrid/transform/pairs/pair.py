@@ -18,7 +18,7 @@ NAME = "be a name that can be written as an attribute"
 
 @attrs.frozen
 class Pair(Portable):
-    """Two quantities ``w >= 0`` and ``z >= 0`` of which at least one is zero, such as those of an ideal diode.
+    """Two quantities ``w >= 0`` and ``z >= 0`` of which one is zero, such as those of an ideal diode.
 
     ``z`` is an unknown of the equations, which read it as ``z.name``; ``w`` is a function. Of a diode, one is
     the current and the other the voltage in the reverse direction, whichever the equations need.

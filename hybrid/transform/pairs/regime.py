@@ -10,10 +10,10 @@ import numpy as np
 
 from hybrid.expression.derivatives import jacobian_of
 from hybrid.expression.evaluation import Program
+from hybrid.expression.linear import Vector, dot, solved
 from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.expression.polynomials import is_zero
 from hybrid.system.growth import Place
-from hybrid.transform.linear import Vector, dot, solved
 from hybrid.transform.pairs.equations import Configuration, Numbers, values_at
 from hybrid.transform.pairs.noise import Manifold
 
@@ -36,7 +36,7 @@ class Shape:
     rows
         Those of them whose ``w`` tells ``z``.
     others
-        Those whose ``w``, less multiples of the rows', is a function of the state alone: its rate tells ``z``.
+        Those whose ``w``, less multiples of the rows', is a function of the state: its rate tells ``z``.
     columns
         As many of the active pairs as there are rows, by which the multiples are found.
     matrix
