@@ -10,7 +10,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from hybrid.errors import ModelError
+from hybrid.errors import ArgumentError, ModelError
 from hybrid.expression.derivatives import directional, jacobian_of
 from hybrid.expression.evaluation import Program
 from hybrid.expression.graph import all_replaced, mentions, nodes_of
@@ -30,6 +30,8 @@ from hybrid.transform.titles import titles_of
 
 # By the number of a surface, -1 below it and 1 above it.
 Sides = tuple[tuple[int, int], ...]
+# Rows of a smaller singular value, or entries, relative to the largest, are rounding.
+ROUNDING = 1e-9
 
 
 @attrs.frozen(eq=False)
@@ -83,6 +85,31 @@ class Configuration:
         a, B, q, D, slopes = np.split(values, np.cumsum([n, n * m, m, m * m]))
         return Numbers(a, B.reshape(m, n).T, q, D.reshape(m, m), slopes.reshape(m, n + 1))
 
+    def is_monotone(self, place: Place) -> bool:
+        """Whether no two motions can begin at one state, at the parameters of a place.
+
+        The squared distance of two motions, with a matrix ``P``, grows no faster than the distance itself if
+        ``z`` adds nothing to it: if ``D`` is positive semidefinite and ``P B = C^T``, with ``C = D_x q``, for
+        the ``z`` of which ``z D z`` is zero. Passive circuits have that; ``P`` is the energy.
+        """
+        varies = [*_flat(self.B), *_flat([row[:-1] for row in self._slopes])]
+        if any(mentions(each, self.symbols.variables) for each in varies):
+            return False
+        found = self.at(place)
+        B, C = found.B, found.slopes[:, :-1]
+        values, vectors = np.linalg.eigh(found.D + found.D.T)
+        size = np.abs(values).max()
+        if values[0] < -ROUNDING * size:
+            return False
+        free = vectors[:, values <= ROUNDING * size]
+        joint = free.T @ C @ B @ free
+        size = np.abs(joint).max(initial=0.0)
+        if np.abs(joint - joint.T).max(initial=0.0) > ROUNDING * size:
+            return False
+        least = np.linalg.eigvalsh(joint)[:1]
+        ranks = {rank_of(each) for each in (joint, B @ free, C.T @ free)}
+        return bool((least >= -ROUNDING * size).all()) and len(ranks) == 1
+
     def rates(self, expressions: Sequence[Expression], field: Vector) -> Vector:
         """The rates of expressions along a field."""
         return directional(
@@ -91,8 +118,11 @@ class Configuration:
 
     @cached_property
     def _program(self) -> Program:
-        slopes = jacobian_of(self.q, self.symbols.variables)
-        return Program([*self.a, *_flat(self.B), *self.q, *_flat(self.D), *_flat(slopes)])
+        return Program([*self.a, *_flat(self.B), *self.q, *_flat(self.D), *_flat(self._slopes)])
+
+    @cached_property
+    def _slopes(self) -> list[list[Expression]]:
+        return jacobian_of(self.q, self.symbols.variables)
 
 
 class Equations:
@@ -222,9 +252,31 @@ class Equations:
         """What the name of a mode says of clocks."""
         return self.names.cell(self.surfaces.known, sides)
 
+    def check_factors(self, parameters: np.ndarray) -> None:
+        """An ArgumentError if a factor of ``z`` in ``w`` is zero at parameters, and not at others.
+
+        The modes are made for equations in which it is there, and serve all parameters.
+        """
+        place = 0.0, np.ones(self.variables.dimension), parameters
+        for sides in self.all_sides():
+            own = self.configuration(sides)
+            for pair, row, values in zip(self.pairs, own.D, own.at(place).D, strict=True):
+                for other, factor, value in zip(self.pairs, row, values, strict=True):
+                    if value == 0.0 and factor is not ZERO:
+                        raise ArgumentError(
+                            f"parameters: the factor of z.{other.name} in w of {pair.name!r} is zero at "
+                            "these values, which makes other equations of the model than values beside. "
+                            "Leave the term out of w, or give the parameters other values."
+                        )
+
     def check_names(self) -> None:
         """A ModelError if a name that the author gives is that of nothing that clocks switch."""
         known, titles = self.surfaces.known, self.names.titles
+        if titles.given and not self.clocks:
+            raise ModelError(
+                "complementarity: modes are names of what clocks switch, and these equations have no clock. "
+                "Leave them out; Pair(says=) has a part in the names of modes."
+            )
         words = {
             title
             for sides in self.all_sides()
@@ -252,8 +304,8 @@ class Equations:
                 if any(mentions(each, self.symbols.variables) for each in row):
                     raise ModelError(
                         f"{pair.title}: w must have z with factors that do not depend on the state, and "
-                        "change with clocks alone. Multiply w by what it is divided by, or write the equations "
-                        "with from_equations."
+                        "change with clocks alone. Multiply w by what it is divided by, or write the modes "
+                        "as a HybridSystem."
                     )
             self._known[sides] = Configuration(self.symbols, sides, a, B, q, D)
         return self._known[sides]
@@ -269,3 +321,14 @@ def values_at(symbols: Any, program: Program, place: Place) -> np.ndarray:
 
 def _flat(rows: Sequence[Sequence[Expression]]) -> list[Expression]:
     return [each for row in rows for each in row]
+
+
+def rank_of(matrix: np.ndarray) -> int:
+    """The rank of a matrix, whatever the units of its rows and columns."""
+    if not matrix.size or not np.isfinite(matrix).all():
+        return 0
+    for axis in (0, 1):
+        sizes = np.abs(matrix).max(axis=axis, keepdims=True)
+        matrix = matrix / np.where(sizes > 0.0, sizes, 1.0)
+    singular = np.linalg.svd(matrix, compute_uv=False)
+    return int(np.count_nonzero(singular > ROUNDING * singular[0])) if singular[0] > 0.0 else 0

@@ -66,6 +66,8 @@ class PairGrowth(Deciding):
         self.made: dict[Holding, Made] = {}
         self.notes: dict[str, None] = {}
         self.begins = False
+        self.certain = True
+        self.checked: set[bytes] = set()
         always = Guard(scalar(Number(1)), +1, at_start=True)
         self.beginning = Watch(BEGINNING, None, PairEvent(BEGINS), always, "begin")
         variables = original.variables
@@ -106,7 +108,8 @@ class PairGrowth(Deciding):
 
     def _follow(self, watch: Watch, decision: Decision, place: Place) -> None:
         watch.decisions.append(decision)
-        written = self.judge.written(decision, place, self._manifold(watch, place), self._held(watch))
+        manifold, held = self._manifold(watch, place), self._held(watch)
+        written = self.judge.written(decision, place, manifold, held, self.certain)
         if watch.event.kind == BEGINS:
             written.conditions.extend(self._at_time(decision.sides))
         target = self._make((decision.sides, decision.active), place)
@@ -146,6 +149,10 @@ class PairGrowth(Deciding):
             return self._start((t, x, parameters), mode)
 
     def _start(self, place: Place, mode: str | None) -> str:
+        if (key := place[2].tobytes()) not in self.checked:
+            self.equations.check_factors(place[2])
+            self._doubt(place)
+            self.checked.add(key)
         if mode == BEGINNING or mode in {each.mode.name for each in self.made.values()}:
             assert mode is not None, "a mode has a name"
             return mode
@@ -164,6 +171,17 @@ class PairGrowth(Deciding):
         self.stage = self.stage if self.begins else None
         self.begins = True
         return BEGINNING
+
+    def _doubt(self, place: Place) -> None:
+        """Decide all transitions again if motions may not be unique at parameters, and were at others."""
+        sides = self.equations.all_sides()
+        certain = all(self.equations.configuration(each).is_monotone(place) for each in sides)
+        if self.certain and not certain:
+            for watch in self._all_watches():
+                watch.cases.clear()
+                watch.decisions.clear()
+            self.stage = None
+        self.certain = certain and self.certain
 
     def _named(self, mode: str) -> Holding:
         """What holds in the mode of a name."""

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import reduce
 from itertools import combinations
 
 import attrs
 import numpy as np
 
+from hybrid.errors import ArgumentError
 from hybrid.expression.evaluation import Program
 from hybrid.expression.graph import all_replaced
 from hybrid.expression.linear import Vector
-from hybrid.expression.nodes import ZERO, Expression
+from hybrid.expression.nodes import ONE, ZERO, Expression
+from hybrid.expression.operations import And, Not
 from hybrid.system.growth import Place
 from hybrid.transform.deciding import NothingDecided, Written
 from hybrid.transform.pairs.equations import Equations, Sides, values_at
 from hybrid.transform.pairs.noise import NOISE, Manifold, at_first, not_negative, size_of, vanishing
-from hybrid.transform.pairs.regime import Regime, is_far, regime_of, shape_of
+from hybrid.transform.pairs.regime import Regime, Shape, is_far, regime_of, shape_of
 
 NO_SOLUTION, NOT_UNIQUE = "no solution", "not unique"
 # Cases whose rates differ by more than this share of their terms are several.
@@ -71,8 +74,21 @@ class Judge:
             shape = shape_of(configuration.at(place), active)
             if shape is None:
                 return None
+            self._check_shape(shape, sides, place)
             self._regimes[sides, active] = regime_of(configuration, shape, place)
         return self._regimes[sides, active]
+
+    def _check_shape(self, shape: Shape, sides: Sides, place: Place) -> None:
+        """An ArgumentError if other equations tell ``z`` at parameters beside these."""
+        t, x, parameters = place
+        beside = t, x, parameters * np.linspace(0.9, 1.1, len(parameters))
+        other = shape_of(self.equations.configuration(sides).at(beside), shape.active)
+        if other is not None and other.rows != shape.rows:
+            names = ", ".join(self.equations.pairs[i].name for i in shape.active)
+            raise ArgumentError(
+                f"parameters: factors of z in w of {names} cancel at these values, which makes other "
+                "equations of the model than values beside. Give the parameters other values."
+            )
 
     def manifold(self, zero: Sequence[Expression], place: Place) -> Manifold:
         """The points around a state at which expressions are zero."""
@@ -160,8 +176,18 @@ class Judge:
             for kind in kinds:
                 yield Decision(sides, kicked, kind[0].active), after
 
-    def written(self, decision: Decision, place: Place, manifold: Manifold, held: Vector) -> Written:
-        """A decision as expressions; ``held`` is what is zero before, beside what the event says."""
+    def written(
+        self, decision: Decision, place: Place, manifold: Manifold, held: Vector, unique: bool
+    ) -> Written:
+        """A decision as expressions.
+
+        Parameters
+        ----------
+        manifold, held
+            What is zero before with what the event says, and without.
+        unique
+            Whether no other motion can go on where one does.
+        """
         x = self.equations.symbols.x
         state: Vector = [*x]
         conditions: list[Expression] = []
@@ -174,10 +200,10 @@ class Judge:
             manifold = self.manifold(kick.holds, place)
         regime = self._regime(decision.sides, decision.active, place)
         after = dict(zip(x, state, strict=True))
-        going_on = [vanishing(each) for each in regime.holds if not manifold.has(each)]
-        for i in regime.asked:
-            levels = [each for each in regime.levels(i) if not manifold.has(each)]
-            going_on += [at_first(levels)] if levels else []
+        going_on = _going_on(regime, manifold)
+        if not unique:
+            others = (_going_on(each, manifold) for each in self._others(regime, place, manifold))
+            going_on += [Not(reduce(And, each, ONE)) for each in others]
         conditions += all_replaced(going_on, after)
         is_held = self.manifold(held, place).has if decision.kicked is None else manifold.has
         if decision.kicked is not None or not all(map(is_held, regime.holds)):
@@ -185,7 +211,26 @@ class Judge:
             return Written(conditions, all_replaced(drawn, after))
         return Written(conditions, None)
 
+    def _others(self, regime: Regime, place: Place, manifold: Manifold) -> Iterator[Regime]:
+        """The other motions that might go on where one does."""
+        sides = regime.configuration.sides
+        for active in self.cases():
+            other = self.regime(sides, active, place)
+            if other is not None and other is not regime:
+                pairs = zip(regime.speeds, other.speeds, strict=True)
+                if not all(manifold.has(a - b) for a, b in pairs):
+                    yield other
+
     def _regime(self, sides: Sides, active: tuple[int, ...], place: Place) -> Regime:
         found = self.regime(sides, active, place)
         assert found is not None, "the decision has been made with it"
         return found
+
+
+def _going_on(regime: Regime, manifold: Manifold) -> list[Expression]:
+    """The conditions that a motion goes on from a state of a manifold."""
+    found = [vanishing(each) for each in regime.holds if not manifold.has(each)]
+    for i in regime.asked:
+        levels = [each for each in regime.levels(i) if not manifold.has(each)]
+        found += [at_first(levels)] if levels else []
+    return found

@@ -76,7 +76,7 @@ class Manifold:
         scale = np.where(x == 0.0, 1.0, np.abs(x))
         self.known: dict[Expression, bool] = dict.fromkeys(self.zero, True)
         self.points: list[tuple[Place, np.ndarray]] = []
-        for _ in range(POINTS):
+        for _ in range(POINTS if self.zero else 0):
             there = x + AROUND * scale * rng.uniform(-1.0, 1.0, len(x))
             # Parameters that happen to be equal, or zero, should not count as such.
             values = parameters * (1.0 + AROUND * rng.uniform(-1.0, 1.0, len(parameters)))
@@ -90,7 +90,7 @@ class Manifold:
         t, x, parameters = place
         units = np.append(scale, max(abs(t), 1.0))
         program = self._with_slopes(self.zero)
-        for _ in range(MOST_STEPS if self.zero else 0):
+        for _ in range(MOST_STEPS):
             values = values_at(self.symbols, program, (t, x, parameters)).reshape(len(self.zero), -1)
             value, slopes = values[:, 0], values[:, 1:] * units
             if not np.isfinite(values).all():
@@ -103,6 +103,8 @@ class Manifold:
 
     def has(self, expression: Expression) -> bool:
         """Whether an expression vanishes on the manifold."""
+        if not self.zero:
+            return expression is ZERO
         if expression not in self.known:
             program = self._with_slopes([expression, size_of(expression)])
             self.known[expression] = bool(self.points) and all(

@@ -14,11 +14,9 @@ from hybrid.expression.linear import Vector, dot, solved
 from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.expression.polynomials import is_zero
 from hybrid.system.growth import Place
-from hybrid.transform.pairs.equations import Configuration, Numbers, values_at
+from hybrid.transform.pairs.equations import Configuration, Numbers, rank_of, values_at
 from hybrid.transform.pairs.noise import Manifold
 
-# Rows of a smaller singular value, relative to the largest, depend on each other.
-DEPENDENT = 1e-9
 # What is negative by this much is no candidate, whatever is known to be zero.
 FAR = 1e-6
 # Derivatives in time that are asked where values are zero.
@@ -60,7 +58,7 @@ def shape_of(numbers: Numbers, active: tuple[int, ...]) -> Shape | None:
     columns = [active[k] for k in _independent(D[chosen].T)]
     slopes = _reduced(numbers, numbers.slopes, rows, others, columns)
     matrix = np.vstack([numbers.D[np.ix_(rows, own)], slopes[:, :-1] @ numbers.B[:, own]])
-    if _rank(matrix) < len(active):
+    if rank_of(matrix) < len(active):
         return None
     return Shape(active, tuple(rows), tuple(others), tuple(columns), matrix)
 
@@ -96,20 +94,9 @@ def _independent(matrix: np.ndarray) -> list[int]:
     """The first rows that do not depend on rows before."""
     kept: list[int] = []
     for i in range(len(matrix)):
-        if _rank(matrix[[*kept, i]]) > len(kept):
+        if rank_of(matrix[[*kept, i]]) > len(kept):
             kept.append(i)
     return kept
-
-
-def _rank(matrix: np.ndarray) -> int:
-    """The rank of a matrix, whatever the units of its rows and columns."""
-    if not matrix.size or not np.isfinite(matrix).all():
-        return 0
-    for axis in (0, 1):
-        sizes = np.abs(matrix).max(axis=axis, keepdims=True)
-        matrix = matrix / np.where(sizes > 0.0, sizes, 1.0)
-    singular = np.linalg.svd(matrix, compute_uv=False)
-    return int(np.count_nonzero(singular > DEPENDENT * singular[0])) if singular[0] > 0.0 else 0
 
 
 @attrs.frozen(eq=False)
