@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import product
 from typing import Any
 
 import attrs
@@ -27,6 +28,7 @@ from hybrid.transform.pairs.regime import Regime
 
 # The sides of clocks, and the pairs that are active.
 Holding = tuple[Sides, tuple[int, ...]]
+QUANTITIES = "w", "z"
 REACHES, TICKS, BEGINS = "reaches", "ticks", "begins"
 
 
@@ -49,11 +51,11 @@ class PairEvent:
 
 @attrs.frozen(eq=False)
 class Made:
-    """A mode that has been made; ``undetermined`` are the pairs whose ``w`` or ``z`` nothing tells there."""
+    """A mode that has been made; ``undetermined`` are the ``w`` and ``z`` that nothing tells there."""
 
     mode: Mode
     regime: Regime
-    undetermined: frozenset[int]
+    undetermined: frozenset[tuple[int, str]]
     watches: list[Watch]
 
 
@@ -159,7 +161,7 @@ class PairGrowth(Deciding):
         if mode is not None:
             return self._make(self._named(mode), place).mode.name
         sides = self.equations.sides_at(place)
-        kinds = self.judge.kinds(sides, place, self.judge.manifold([], place))
+        kinds = self.judge.kinds(sides, place, self.judge.anywhere(place))
         if len(kinds) > 1:
             names = " or ".join(repr(self._name((sides, kind[0].active))) for kind in kinds)
             raise ArgumentError(
@@ -216,28 +218,29 @@ class PairGrowth(Deciding):
             unknown = self._undetermined(regime, place)
             self.made[holding] = Made(mode, regime, unknown, watches)
             if unknown:
-                names = ", ".join(self.equations.pairs[i].name for i in sorted(unknown))
-                self.notes[f"{name}: z and w of {names} are not determined there; the motion is."] = None
+                names = ", ".join(self._output(*each) for each in sorted(unknown))
+                self.notes[f"{name}: {names} are not determined there; the motion is."] = None
             self.stage = None
         return self.made[holding]
 
-    def _undetermined(self, regime: Regime, place: Place) -> frozenset[int]:
-        """The pairs whose ``w`` or ``z`` nothing tells, such as voltages of a part without connection."""
+    def _undetermined(self, regime: Regime, place: Place) -> frozenset[tuple[int, str]]:
+        """The ``w`` and ``z`` that nothing tells, such as voltages of a part without connection."""
         held = self.judge.manifold(regime.holds, place)
         kinds = self.judge.kinds(regime.configuration.sides, place, held)
         alike = next((kind for kind in kinds if regime in kind), [])
         return frozenset(
-            i
+            (i, what)
             for other in alike
             for i in range(len(self.equations.pairs))
-            if not (held.has(regime.z[i] - other.z[i]) and held.has(regime.w[i] - other.w[i]))
+            for what in QUANTITIES
+            if not held.has(getattr(regime, what)[i] - getattr(other, what)[i])
         )
 
     def _watches(self, source: str, holding: Holding, regime: Regime) -> Iterator[Watch]:
         """What a mode looks out for."""
         sides, active = holding
         for together in self._together(regime):
-            names = (f"{self.equations.pairs[i].name}.{'z' if i in active else 'w'}" for i in together)
+            names = (self._output(i, "z" if i in active else "w") for i in together)
             guard = Guard(scalar(regime.levels(together[0])[0]), -1)
             yield Watch(source, holding, PairEvent(REACHES, together[0]), guard, ", ".join(names))
         for number, side in sides:
@@ -287,15 +290,18 @@ class PairGrowth(Deciding):
     def _outputs(self) -> dict[str, Output]:
         """``w`` and ``z`` of each pair, in the modes that have been made."""
         found = {}
-        for i, pair in enumerate(self.equations.pairs):
-            for what in ("w", "z"):
-                formulas = [
-                    Formula(each.mode.name, scalar(getattr(each.regime, what)[i]))
-                    for each in self.made.values()
-                    if i not in each.undetermined
-                ]
-                found[f"{pair.name}.{what}"] = Output(f"{pair.name}.{what}", tuple(formulas))
+        for i, what in product(range(len(self.equations.pairs)), QUANTITIES):
+            formulas = [
+                Formula(each.mode.name, scalar(getattr(each.regime, what)[i]))
+                for each in self.made.values()
+                if (i, what) not in each.undetermined
+            ]
+            name = self._output(i, what)
+            found[name] = Output(name, tuple(formulas))
         return found
+
+    def _output(self, i: int, what: str) -> str:
+        return f"{self.equations.pairs[i].name}.{what}"
 
 
 def _flipped(sides: Sides, number: int) -> Sides:

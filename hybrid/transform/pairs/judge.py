@@ -90,6 +90,12 @@ class Judge:
                 "equations of the model than values beside. Give the parameters other values."
             )
 
+    def anywhere(self, place: Place) -> Manifold:
+        """What is known to be zero at a start: nothing but zero itself, and no further look is taken."""
+        found = self.manifold([], place)
+        found.points = []
+        return found
+
     def manifold(self, zero: Sequence[Expression], place: Place) -> Manifold:
         """The points around a state at which expressions are zero."""
         return Manifold(self.equations.symbols, zero, place)

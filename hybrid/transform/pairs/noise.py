@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import reduce
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,8 @@ from hybrid.transform.pairs.equations import values_at
 NOISE = 1e-9
 # Points at which an expression has to vanish, how far around a state, and the steps of Newton's method.
 POINTS, AROUND, MOST_STEPS = 4, 0.3, 20
+# A step of Newton's method this small is its last; and how much rather it moves the state than time.
+FOUND, SLOWER = 1e-13, 1e-6
 
 
 def size_of(expression: Expression) -> Expression:
@@ -70,47 +72,53 @@ class Manifold:
     """
 
     def __init__(self, symbols: Any, zero: Sequence[Expression], place: Place) -> None:
-        self.symbols, self.zero = symbols, tuple(each for each in zero if each is not ZERO)
-        t, x, parameters = place
+        self.symbols, self.place = symbols, place
+        self.zero = tuple(each for each in zero if each is not ZERO)
+        self.known: dict[Expression, bool] = dict.fromkeys(self.zero, True)
+
+    def has(self, expression: Expression) -> bool:
+        """Whether an expression vanishes on the manifold."""
+        if expression not in self.known and self.points:
+            program = self._with_slopes([expression, size_of(expression)])
+            self.known[expression] = all(self._is_zero(program, *each) for each in self.points)
+        return self.known.get(expression, False)
+
+    @cached_property
+    def points(self) -> list[tuple[Place, np.ndarray]]:
+        """Some points, each with the sizes of the states and of time."""
+        t, x, parameters = self.place
         rng = np.random.default_rng(20240507)
         scale = np.where(x == 0.0, 1.0, np.abs(x))
-        self.known: dict[Expression, bool] = dict.fromkeys(self.zero, True)
-        self.points: list[tuple[Place, np.ndarray]] = []
-        for _ in range(POINTS if self.zero else 0):
+        found = []
+        for _ in range(POINTS):
             there = x + AROUND * scale * rng.uniform(-1.0, 1.0, len(x))
             # Parameters that happen to be equal, or zero, should not count as such.
             values = parameters * (1.0 + AROUND * rng.uniform(-1.0, 1.0, len(parameters)))
             values = np.where(parameters == 0.0, rng.uniform(0.5, 1.0, len(parameters)), values)
             point = self._onto((t + AROUND * max(abs(t), 1.0) * rng.uniform(), there, values), scale)
             if point is not None:
-                self.points.append((point, np.append(np.abs(there) + scale, max(abs(t), 1.0))))
+                found.append((point, np.append(np.abs(there) + scale, max(abs(t), 1.0))))
+        return found
 
     def _onto(self, place: Place, scale: np.ndarray) -> Place | None:
         """A point of the manifold, by Newton's method; None if it finds none."""
         t, x, parameters = place
-        units = np.append(scale, max(abs(t), 1.0))
-        program = self._with_slopes(self.zero)
-        for _ in range(MOST_STEPS):
-            values = values_at(self.symbols, program, (t, x, parameters)).reshape(len(self.zero), -1)
+        # A forcing may turn many times: the state is moved rather than time.
+        units = np.append(scale, SLOWER * max(abs(t), 1.0))
+        for _ in range(MOST_STEPS if self.zero else 0):
+            values = values_at(self.symbols, self._program, (t, x, parameters)).reshape(len(self.zero), -1)
             value, slopes = values[:, 0], values[:, 1:] * units
             if not np.isfinite(values).all():
                 return None
             step = units * np.linalg.lstsq(slopes, -value, rcond=None)[0]
             t, x = t + float(step[-1]), x + step[:-1]
-            if (np.abs(step) <= 1e-14 * units).all():
-                break
-        return t, x, parameters
+            if (np.abs(step[:-1]) <= FOUND * scale).all() and abs(step[-1]) <= FOUND * max(abs(t), 1.0):
+                return t, x, parameters
+        return None if self.zero else place
 
-    def has(self, expression: Expression) -> bool:
-        """Whether an expression vanishes on the manifold."""
-        if not self.zero:
-            return expression is ZERO
-        if expression not in self.known:
-            program = self._with_slopes([expression, size_of(expression)])
-            self.known[expression] = bool(self.points) and all(
-                self._is_zero(program, *each) for each in self.points
-            )
-        return self.known[expression]
+    @cached_property
+    def _program(self) -> Program:
+        return self._with_slopes(self.zero)
 
     def _is_zero(self, program: Program, place: Place, scale: np.ndarray) -> bool:
         values = values_at(self.symbols, program, place)
