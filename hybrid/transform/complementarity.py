@@ -125,7 +125,8 @@ def complementarity(
     judge = Judge(equations)
     _check_degrees(judge)
     own = as_outputs({} if outputs is None else outputs, "complementarity")
-    taken = sorted(own.keys() & {f"{each.name}.{what}" for each in found for what in ("w", "z")})
+    told = {f"{each.name}.{what}": _free_of_pairs for each in found for what in ("w", "z")}
+    taken = sorted(own.keys() & told.keys())
     if taken:
         raise ModelError(f"complementarity: outputs: {taken[0]!r} is told of a pair. Choose another name.")
     original = HybridSystem(
@@ -137,7 +138,7 @@ def complementarity(
         name=name,
         units={} if units is None else units,
         angles={} if angles is None else angles,
-        outputs=own,
+        outputs={**own, **as_outputs(told)},
         laws=Laws() if laws is None else laws,
         derived_from=Watched([rates, *(each.w for each in found)]),
     )
@@ -162,6 +163,11 @@ def _checked(pairs: Iterable[Pair]) -> tuple[Pair, ...]:
             f"{len(found)}. Divide the model, or write its modes as a HybridSystem."
         )
     return found
+
+
+def _free_of_pairs(t: Any, x: Any, p: Any) -> float:
+    """Stands for a quantity of a pair until modes are made."""
+    return 0.0
 
 
 def _without_pairs(equations: Any) -> Function:

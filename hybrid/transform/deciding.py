@@ -156,7 +156,7 @@ class Deciding(Stages):
         transition = Transition(
             watch.source,
             target,
-            attrs.evolve(watch.guard, when=None if asked == 1 else scalar(asked)),
+            _asking(watch.guard, asked),
             None if written.state is None else Reset(expressed(written.state)),
             accumulates_to=accumulates_to,
             name=self._unused(f"{watch.source}->{target} by {title}"),
@@ -185,13 +185,17 @@ class Deciding(Stages):
             return None
         part = watch.title if watch.undecided is None else watch.undecided.name
         name = self._frontier_name(watch, part)
-        guard = attrs.evolve(watch.guard, when=None if condition == 1 else scalar(condition))
-        return Transition(watch.source, None, guard, name=name, part_of=part)
+        return Transition(watch.source, None, _asking(watch.guard, condition), name=name, part_of=part)
 
     def _frontier_name(self, watch: Watch, part: str) -> str:
         """A name that stays: a run in another thread may still be on an earlier stage."""
         first = part if watch.undecided is not None else f"{watch.source}: {part}"
         return next(each for each in numbered(first) if self.frontier.setdefault(each, watch) is watch)
+
+
+def _asking(guard: Any, condition: Expression) -> Any:
+    """A guard, or a clock, with a condition."""
+    return attrs.evolve(guard, when=None if condition == 1 else scalar(condition))
 
 
 def _made_again(make: Callable[..., HybridSystem], called: Mapping[str, Any]) -> Any:

@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from hybrid.errors import ArgumentError, ModelError
-from hybrid.expression.evaluation import expressed, scalar
+from hybrid.expression.evaluation import Program, expressed, scalar
 from hybrid.expression.graph import mentions
 from hybrid.expression.linear import Vector
 from hybrid.expression.nodes import ZERO, Expression, Number
@@ -19,8 +19,8 @@ from hybrid.system.elements import Function, Guard, Mode
 from hybrid.system.graph import HybridSystem
 from hybrid.system.growth import Place
 from hybrid.system.outputs import Formula, Output
-from hybrid.transform.deciding import Deciding, Origin, Watch, decided_by
-from hybrid.transform.pairs.equations import Sides
+from hybrid.transform.deciding import Deciding, Origin, Watch, Written, decided_by
+from hybrid.transform.pairs.equations import Sides, values_at
 from hybrid.transform.pairs.judge import NO_SOLUTION, Decision, Judge, Undecided
 from hybrid.transform.pairs.noise import Manifold
 from hybrid.transform.pairs.pair import BEGINNING, active_name
@@ -51,11 +51,10 @@ class PairEvent:
 
 @attrs.frozen(eq=False)
 class Made:
-    """A mode that has been made; ``undetermined`` are the ``w`` and ``z`` that nothing tells there."""
+    """A mode that has been made."""
 
     mode: Mode
     regime: Regime
-    undetermined: frozenset[tuple[int, str]]
     watches: list[Watch]
 
 
@@ -66,6 +65,7 @@ class PairGrowth(Deciding):
         super().__init__(original, origin)
         self.judge, self.equations = judge, judge.equations
         self.made: dict[Holding, Made] = {}
+        self.unknown: dict[Holding, frozenset[tuple[int, str]]] = {}
         self.notes: dict[str, None] = {}
         self.begins = False
         self.certain = True
@@ -114,8 +114,15 @@ class PairGrowth(Deciding):
         written = self.judge.written(decision, place, manifold, held, self.certain)
         if watch.event.kind == BEGINS:
             written.conditions.extend(self._at_time(decision.sides))
-        target = self._make((decision.sides, decision.active), place)
-        self._add(watch, written, target.mode.name, watch.title)
+        target = self._entered((decision.sides, decision.active), self._after(written, place))
+        self._add(watch, written, target, watch.title)
+
+    def _after(self, written: Written, place: Place) -> Place:
+        """The state after a transition."""
+        if written.state is None:
+            return place
+        t, _, parameters = place
+        return t, values_at(self.equations.symbols, Program(written.state), place), parameters
 
     def _at_time(self, sides: Sides) -> Iterator[Expression]:
         """That clocks have switched to these sides."""
@@ -159,7 +166,7 @@ class PairGrowth(Deciding):
             assert mode is not None, "a mode has a name"
             return mode
         if mode is not None:
-            return self._make(self._named(mode), place).mode.name
+            return self._entered(self._named(mode), place)
         sides = self.equations.sides_at(place)
         kinds = self.judge.kinds(sides, place, self.judge.anywhere(place))
         if len(kinds) > 1:
@@ -169,7 +176,7 @@ class PairGrowth(Deciding):
                 "with mode=."
             )
         if kinds:
-            return self._make((sides, kinds[0][0].active), place).mode.name
+            return self._entered((sides, kinds[0][0].active), place)
         self.stage = self.stage if self.begins else None
         self.begins = True
         return BEGINNING
@@ -215,13 +222,20 @@ class PairGrowth(Deciding):
             holds = expressed(regime.holds) if regime.holds else None
             mode = Mode(name, expressed(regime.drawn), holds=holds)
             watches = [*self._watches(name, holding, regime)]
-            unknown = self._undetermined(regime, place)
-            self.made[holding] = Made(mode, regime, unknown, watches)
-            if unknown:
-                names = ", ".join(self._output(*each) for each in sorted(unknown))
-                self.notes[f"{name}: {names} are not determined there; the motion is."] = None
+            self.made[holding] = Made(mode, regime, watches)
             self.stage = None
         return self.made[holding]
+
+    def _entered(self, holding: Holding, place: Place) -> str:
+        """The name of a mode that a run enters."""
+        made = self._make(holding, place)
+        if holding not in self.unknown:
+            unknown = self.unknown[holding] = self._undetermined(made.regime, place)
+            if unknown:
+                names = ", ".join(self._output(*each) for each in sorted(unknown))
+                self.notes[f"{made.mode.name}: {names} are not determined there; the motion is."] = None
+                self.stage = None
+        return made.mode.name
 
     def _undetermined(self, regime: Regime, place: Place) -> frozenset[tuple[int, str]]:
         """The ``w`` and ``z`` that nothing tells, such as voltages of a part without connection."""
@@ -293,8 +307,8 @@ class PairGrowth(Deciding):
         for i, what in product(range(len(self.equations.pairs)), QUANTITIES):
             formulas = [
                 Formula(each.mode.name, scalar(getattr(each.regime, what)[i]))
-                for each in self.made.values()
-                if (i, what) not in each.undetermined
+                for holding, each in self.made.items()
+                if (i, what) not in self.unknown.get(holding, ())
             ]
             name = self._output(i, what)
             found[name] = Output(name, tuple(formulas))

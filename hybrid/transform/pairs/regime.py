@@ -50,14 +50,14 @@ class Shape:
 
 def shape_of(numbers: Numbers, active: tuple[int, ...]) -> Shape | None:
     """Which equations tell ``z`` at a state; None if neither ``w`` nor its rate does."""
-    own = np.array(active, dtype=int)
-    D = numbers.D[np.ix_(own, own)]
+    own = [*active]
+    D = numbers.D[own][:, own]
     chosen = _independent(D)
     rows = [active[k] for k in chosen]
     others = [i for i in active if i not in rows]
     columns = [active[k] for k in _independent(D[chosen].T)]
     slopes = _reduced(numbers, numbers.slopes, rows, others, columns)
-    matrix = np.vstack([numbers.D[np.ix_(rows, own)], slopes[:, :-1] @ numbers.B[:, own]])
+    matrix = np.vstack([numbers.D[rows][:, own], slopes[:, :-1] @ numbers.B[:, own]])
     if rank_of(matrix) < len(active):
         return None
     return Shape(active, tuple(rows), tuple(others), tuple(columns), matrix)
@@ -65,10 +65,8 @@ def shape_of(numbers: Numbers, active: tuple[int, ...]) -> Shape | None:
 
 def is_far(numbers: Numbers, shape: Shape) -> bool:
     """Whether a quantity is so negative at a state that no closer look is needed."""
-    own, rows, others, columns = (
-        np.array(each, dtype=int) for each in (shape.active, shape.rows, shape.others, shape.columns)
-    )
-    slopes = _reduced(numbers, numbers.slopes, rows, others, columns)
+    own, rows = [*shape.active], [*shape.rows]
+    slopes = _reduced(numbers, numbers.slopes, rows, shape.others, shape.columns)
     rates = slopes[:, :-1] @ numbers.a + slopes[:, -1]
     right = np.concatenate([-numbers.q[rows], -rates])
     terms = np.concatenate([np.abs(numbers.q[rows]), np.abs(slopes[:, :-1]) @ np.abs(numbers.a)])
@@ -84,9 +82,10 @@ def _reduced(
     numbers: Numbers, of: np.ndarray, rows: Sequence[int], others: Sequence[int], columns: Sequence[int]
 ) -> np.ndarray:
     """The rows of others, less the multiples of rows that leave no ``z`` in ``w``."""
-    if not len(rows) or not len(others):
+    if not rows or not others:
         return of[[*others]]
-    factors = np.linalg.solve(numbers.D[np.ix_(rows, columns)].T, numbers.D[np.ix_(others, columns)].T).T
+    D = numbers.D[:, [*columns]]
+    factors = np.linalg.solve(D[[*rows]].T, D[[*others]].T).T
     return np.asarray(of[[*others]] - factors @ of[[*rows]])
 
 
@@ -194,7 +193,7 @@ def _functions_of_state(configuration: Configuration, shape: Shape, numbers: Num
         return [q[i] for i in shape.others]
     square = [[D[i][k] for i in shape.rows] for k in shape.columns]
     columns = [[D[i][k] for k in shape.columns] for i in shape.others]
-    factors = solved(square, columns, numbers.D[np.ix_(shape.rows, shape.columns)].T)
+    factors = solved(square, columns, numbers.D[[*shape.rows]][:, [*shape.columns]].T)
     return [
         _plain(q[i] - node(dot(own, [q[k] for k in shape.rows])))
         for i, own in zip(shape.others, factors, strict=True)
