@@ -39,6 +39,7 @@ README = HERE.parent / "README.md"
 PLAIN = HERE / "plain-equations.md"
 OUTPUTS = HERE / "outputs.md"
 CONTACTS = HERE / "contacts-from-gaps.md"
+DIODES = HERE / "diodes-and-complementarity.md"
 STYLE = {"font.size": 9, "axes.titlesize": 10, "axes.titlelocation": "left", "savefig.dpi": 160}
 
 
@@ -118,6 +119,13 @@ def contacts_picture(system: HybridSystem, folder: Path) -> None:
     arc = simulate(system, {"x": 0.0, "y": 1.0, "u": 3.0, "v": 0.0}, (0.0, 4.0))
     axes = plot_arc(arc, figsize=(6.4, 5.6))
     save(axes.figure, folder / "contacts_over_time.png")
+
+
+def diodes_picture(system: HybridSystem, folder: Path) -> None:
+    """A boost converter whose current stops in each period."""
+    arc = simulate(system, (0.0, 40.0), (0.0, 4 * system.parameters["T"]))
+    axes = plot_arc(arc, ["i", "v", "diode.z"], figsize=(6.4, 4.8))
+    save(axes.figure, folder / "boost_with_a_diode.png")
 
 
 def chart_picture(system: HybridSystem, folder: Path) -> None:
@@ -200,6 +208,7 @@ def main() -> None:
         split_picture(model_of(PLAIN, "oscillator"), folder)
         outputs_picture(model_of(OUTPUTS, "ball"), folder)
         contacts_picture(model_of(CONTACTS, "block"), folder)
+        diodes_picture(model_of(DIODES, "boost"), folder)
         chart_picture(system, folder)
         branch_picture(folder)
         equilibria_picture(folder)

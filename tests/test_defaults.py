@@ -41,6 +41,11 @@ DEFAULTS = {
     hybrid.Guard: {"direction": 0, "gradient": None, "when": None, "at_start": False},
     hybrid.Mode: {"jacobian": None, "holds": None, "part_of": None},
     hybrid.Contact: {"restitution": 0.0, "friction": 0.0, "slip": None, "static": None},
+    hybrid.Pair: {"says": ""},
+    hybrid.complementarity: {
+        "modes": None,
+        **{name: value for name, value in PLAIN.items() if name != "cyclic"},
+    },
     hybrid.mechanics: {
         **{"mass": None, "forces": None, "kinetic": None, "potential": None, "impacts": "newton"},
         **{"together": 1e-9, "start": None, **PLAIN},

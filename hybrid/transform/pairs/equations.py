@@ -282,7 +282,7 @@ class Equations:
             for sides in self.all_sides()
             for title in titles.of(sides, lambda number, side: self.names.side(known, number, side))[0]
         }
-        titles.check(words, [each for sides in self.all_sides() if (each := self.named(sides))])
+        titles.check(words, [self.named(sides) for sides in self.all_sides()])
 
     def configuration(self, sides: Sides) -> Configuration:
         """The equations on some sides.

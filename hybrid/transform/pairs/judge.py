@@ -19,7 +19,7 @@ from hybrid.system.growth import Place
 from hybrid.transform.deciding import NothingDecided, Written
 from hybrid.transform.pairs.equations import Equations, Sides, values_at
 from hybrid.transform.pairs.noise import NOISE, Manifold, at_first, not_negative, size_of, vanishing
-from hybrid.transform.pairs.regime import Regime, Shape, is_far, regime_of, shape_of
+from hybrid.transform.pairs.regime import Regime, is_far, regime_of, shape_of
 
 NO_SOLUTION, NOT_UNIQUE = "no solution", "not unique"
 # Cases whose rates differ by more than this share of their terms are several.
@@ -68,27 +68,31 @@ class Judge:
             yield from combinations(range(count), size)
 
     def regime(self, sides: Sides, active: tuple[int, ...], place: Place) -> Regime | None:
-        """The motion with these pairs active; None if neither their ``w`` nor its rate tells ``z``."""
-        if (sides, active) not in self._regimes:
-            configuration = self.equations.configuration(sides)
-            shape = shape_of(configuration.at(place), active)
-            if shape is None:
-                return None
-            self._check_shape(shape, sides, place)
-            self._regimes[sides, active] = regime_of(configuration, shape, place)
-        return self._regimes[sides, active]
+        """The motion with these pairs active; None if neither their ``w`` nor its rate tells ``z``.
 
-    def _check_shape(self, shape: Shape, sides: Sides, place: Place) -> None:
-        """An ArgumentError if other equations tell ``z`` at parameters beside these."""
-        t, x, parameters = place
-        beside = t, x, parameters * np.linspace(0.9, 1.1, len(parameters))
-        other = shape_of(self.equations.configuration(sides).at(beside), shape.active)
-        if other is not None and other.rows != shape.rows:
-            names = ", ".join(self.equations.pairs[i].name for i in shape.active)
+        Raises
+        ------
+        ArgumentError
+            If other equations tell ``z`` at parameters beside these.
+        """
+        configuration = self.equations.configuration(sides)
+        shape = shape_of(configuration.at(place), active)
+        if shape is None:
+            return None
+        known = self._regimes.get((sides, active))
+        if known is None:
+            t, x, parameters = place
+            beside = t, x, parameters * np.linspace(0.9, 1.1, len(parameters))
+            other = shape_of(configuration.at(beside), active)
+            if other is None or other.rows == shape.rows:
+                known = self._regimes[sides, active] = regime_of(configuration, shape, place)
+        if known is None or known.rows != shape.rows:
+            names = ", ".join(self.equations.pairs[i].name for i in active)
             raise ArgumentError(
                 f"parameters: factors of z in w of {names} cancel at these values, which makes other "
                 "equations of the model than values beside. Give the parameters other values."
             )
+        return known
 
     def anywhere(self, place: Place) -> Manifold:
         """What is known to be zero at a start: nothing but zero itself, and no further look is taken."""
@@ -158,29 +162,36 @@ class Judge:
         if kinds:
             return Undecided(NOT_UNIQUE, sides, tuple(kind[0].active for kind in kinds))
         jumps = [*self._jumps(sides, place)]
-        first = jumps[:1]
-        for decision, after in jumps[1:]:
-            if not np.allclose(after, first[0][1], rtol=SEVERAL, atol=SEVERAL * np.abs(after).max()):
-                return Undecided(NOT_UNIQUE, sides, (first[0][0].active, decision.active))
-        return first[0][0] if first else Undecided(NO_SOLUTION, sides)
+        if not jumps:
+            return Undecided(NO_SOLUTION, sides)
+        kick, kinds = jumps[0]
+        several = [kind[0].active for kind in kinds]
+        for other, further in jumps[1:]:
+            if not all(self._agree(a, b, place) for a, b in zip(kick.state, other.state, strict=True)):
+                several.append(further[0][0].active)
+        if len(several) > 1:
+            return Undecided(NOT_UNIQUE, sides, tuple(several))
+        return Decision(sides, kick.active, several[0])
 
-    def _jumps(self, sides: Sides, place: Place) -> Iterator[tuple[Decision, np.ndarray]]:
-        """What may follow if impulses bring the state to where ``w`` is not negative."""
+    def _jumps(self, sides: Sides, place: Place) -> Iterator[tuple[Regime, list[list[Regime]]]]:
+        """The impulses that bring the state to where motions go on, with these motions."""
         t, _, parameters = place
         for kicked in self.cases():
-            regime = self.regime(sides, kicked, place) if kicked else None
-            if regime is None or not regime.holds:
+            kick = self.regime(sides, kicked, place) if kicked else None
+            if kick is None or not kick.holds:
                 continue
-            asked = (self._valued(each, place) for each in (*regime.impulses, *regime.kicks))
+            asked = (self._valued(each, place) for each in (*kick.impulses, *kick.kicks))
             if not all(value >= -NOISE * size for value, size in asked):
                 continue
-            after = values_at(self.equations.symbols, Program(regime.state), place)
-            there = t, after, parameters
-            if not np.isfinite(after).all():
+            # If w is not affine in the state, the impulses do not bring it to zero.
+            left = (self._valued(each, place) for each in kick.left)
+            after = values_at(self.equations.symbols, Program(kick.state), place)
+            if not np.isfinite(after).all() or not all(abs(value) <= SEVERAL * size for value, size in left):
                 continue
-            kinds = self.kinds(sides, there, self.manifold(regime.holds, there))
-            for kind in kinds:
-                yield Decision(sides, kicked, kind[0].active), after
+            there = t, after, parameters
+            kinds = self.kinds(sides, there, self.manifold(kick.holds, there))
+            if kinds:
+                yield kick, kinds
 
     def written(
         self, decision: Decision, place: Place, manifold: Manifold, held: Vector, unique: bool

@@ -10,6 +10,7 @@ import numpy as np
 
 from hybrid.expression.derivatives import jacobian_of
 from hybrid.expression.evaluation import Program
+from hybrid.expression.graph import all_replaced
 from hybrid.expression.linear import Vector, dot, solved
 from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.expression.polynomials import is_zero
@@ -104,8 +105,8 @@ class Regime:
 
     Attributes
     ----------
-    active
-        The pairs whose ``z`` may be positive; their ``w`` is zero.
+    active, rows
+        The pairs whose ``z`` may be positive; their ``w`` is zero. Those of them whose ``w`` tells ``z``.
     holds
         What has to be zero beside: the functions of the state that some of these ``w`` are.
     z, w
@@ -124,6 +125,7 @@ class Regime:
 
     configuration: Configuration
     active: tuple[int, ...]
+    rows: tuple[int, ...]
     holds: Vector
     z: Vector
     w: Vector
@@ -148,6 +150,12 @@ class Regime:
         """The pairs of which something may become negative: not those that others keep at zero."""
         kept = Manifold(self.configuration.symbols, self.holds, self.place)
         return [i for i in range(len(self.z)) if not kept.has(self.levels(i)[0])]
+
+    @cached_property
+    def left(self) -> Vector:
+        """What the impulses leave of ``holds``."""
+        after = dict(zip(self.configuration.symbols.x, self.state, strict=True))
+        return all_replaced(self.holds, after)
 
     @cached_property
     def speeds(self) -> Vector:
@@ -183,7 +191,7 @@ def regime_of(configuration: Configuration, shape: Shape, place: Place) -> Regim
         pace = node(_pace(configuration, field, place))
         drawn = moved(field, [pace * each for each in impulses_own])
     state = moved([*symbols.x], impulses_own)
-    return Regime(configuration, own, holds, z, w, impulses, kicks, field, drawn, state, place)
+    return Regime(configuration, own, shape.rows, holds, z, w, impulses, kicks, field, drawn, state, place)
 
 
 def _functions_of_state(configuration: Configuration, shape: Shape, numbers: Numbers) -> Vector:

@@ -109,6 +109,31 @@ class TestJumps:
         arc = simulate(half_wave(), (-2.0,), (0.0, 1.0))
         np.testing.assert_allclose(arc.jumps[0].x_plus, 0.0, atol=1e-15)
 
+    def test_a_jump_that_is_not_along_a_line_is_no_solution(self):
+        system = one(
+            rates=lambda t, x, z, p: (z.d - x.x,),
+            w=lambda t, x, z, p: x.x + x.x**3 - np.where(np.mod(t, 2.0) < 1.0, 0.0, 2.0),
+        )
+        arc = simulate(system, (0.5,), (0.0, 1.5))
+        assert arc.jumps[-1].transition == "no solution"
+        held = simulate(system, (1.5,), (1.0, 1.9))
+        # It is met without a jump at x = 1, and held there.
+        assert held.x[-1, 0] == pytest.approx(1.0, abs=1e-12)
+        assert held.mode[-1].endswith("d")
+
+    def test_jumps_to_several_motions(self):
+        # Behind the jump to x = 0, w = x + a - a z allows z = 0 and z = 1 beside.
+        system = complementarity(
+            state=("x", "y"),
+            rates=lambda t, x, z, p: (z.d, z.e),
+            pairs=[
+                Pair("d", w=lambda t, x, z, p: x.x),
+                Pair("e", w=lambda t, x, z, p: 1.0 - z.e),
+            ],
+        )
+        arc = simulate(system, (-1.0, 0.0), (0.0, 1.0))
+        assert arc.jumps[-1].transition == "not unique"
+
 
 class TestNoneAndSeveral:
     """With w = x - z two motions begin at x > 0, and none at x < 0."""
@@ -151,6 +176,13 @@ class TestRefusals:
             ({"w": lambda t, x, z, p: t}, "relative degree two or more"),
             ({"w": lambda t, x, z, p: 1.0 if x.x > 0 else 0.0}, "cannot be traced"),
             ({"modes": {"on": lambda t, x, p: t > 1}}, "have no clock"),
+            (
+                {
+                    "w": lambda t, x, z, p: x.x + np.where(np.mod(t, 1.0) < 0.5, 0.0, 1.0),
+                    "modes": {"night": "mod(t,1)>0.7"},
+                },
+                "modes\\['night'\\] holds in no mode",
+            ),
             ({"outputs": {"d.z": lambda t, x, p: x.x}}, "'d.z' is told of a pair"),
         ],
     )
