@@ -24,6 +24,8 @@ from hybrid.transform.pairs.regime import Regime, is_far, regime_of, shape_of
 NO_SOLUTION, NOT_UNIQUE = "no solution", "not unique"
 # Cases whose rates differ by more than this share of their terms are several.
 SEVERAL = 1e-6
+# Of something that is zero so many derivatives in time are asked; if all are zero it stays so.
+DEEPEST = 8
 
 
 @attrs.frozen
@@ -127,11 +129,12 @@ class Judge:
             value, size = (0.0, 0.0) if manifold.has(each) else self._valued(each, place)
             if not abs(value) <= NOISE * size:
                 return False
-        return all(self._is_first(regime.levels(i), place, manifold) for i in regime.asked)
+        return all(self._stays(regime, i, place, manifold) for i in regime.asked)
 
-    def _is_first(self, levels: Vector, place: Place, manifold: Manifold) -> bool:
-        """Whether something is not negative from now on."""
-        for each in levels:
+    def _stays(self, regime: Regime, i: int, place: Place, manifold: Manifold) -> bool:
+        """Whether something of a pair is not negative from now on."""
+        for depth in range(1, DEEPEST + 1):
+            each = regime.levels(i, depth)[-1]
             if manifold.has(each):
                 continue
             value, size = self._valued(each, place)

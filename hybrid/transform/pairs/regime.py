@@ -20,7 +20,7 @@ from hybrid.transform.pairs.noise import Manifold
 
 # What is negative by this much is no candidate, whatever is known to be zero.
 FAR = 1e-6
-# Derivatives in time that are asked where values are zero.
+# The values and derivatives in time that a transition asks where those before are zero.
 DEPTH = 3
 
 
@@ -137,13 +137,12 @@ class Regime:
     place: Place
     _levels: dict[int, Vector] = attrs.field(factory=dict, init=False)
 
-    def levels(self, i: int) -> Vector:
+    def levels(self, i: int, depth: int = DEPTH) -> Vector:
         """What must not be negative of a pair, ``z`` or ``w``, with its derivatives in time."""
-        if i not in self._levels:
-            self._levels[i] = [self.z[i] if i in self.active else self.w[i]]
-            while len(self._levels[i]) < DEPTH:
-                self._levels[i] += self.configuration.rates(self._levels[i][-1:], self.field)
-        return self._levels[i]
+        known = self._levels.setdefault(i, [self.z[i] if i in self.active else self.w[i]])
+        while len(known) < depth:
+            known += self.configuration.rates(known[-1:], self.field)
+        return known[:depth]
 
     @cached_property
     def asked(self) -> list[int]:

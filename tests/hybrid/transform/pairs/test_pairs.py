@@ -11,6 +11,8 @@ from hybrid import (
     Pair,
     StatusCode,
     complementarity,
+    continue_equilibrium,
+    equilibrium,
     filippov,
     simulate,
     simulate_many,
@@ -73,6 +75,22 @@ class TestRelay:
         assert arc.jumps[-1].transition == "not unique"
         assert simulate(system, (1.0,), (0.0, 1.5)).status.ok
 
+    def test_an_equilibrium_that_slides_and_where_it_ends(self):
+        system = complementarity(
+            state=("x", "y"),
+            parameters={"a": 0.3},
+            rates=lambda t, x, z, p: (z.up - 1.0 + p.a + x.y, -x.y),
+            pairs=[
+                Pair("up", w=lambda t, x, z, p: x.x + z.low),
+                Pair("low", w=lambda t, x, z, p: 2.0 - z.up),
+            ],
+        )
+        rest = equilibrium(system, (0.0, 0.2), mode="up")
+        assert rest.admissible
+        assert rest["up.z"] == pytest.approx(0.7, abs=1e-12)
+        ends = continue_equilibrium(rest, "a", (-2.0, 2.0)).bifurcations
+        np.testing.assert_allclose([each.value for each in ends], [-1.0, 1.0], atol=1e-9)
+
 
 class TestJumps:
     def test_capacitors_share_their_charge(self):
@@ -133,6 +151,20 @@ class TestJumps:
         )
         arc = simulate(system, (-1.0, 0.0), (0.0, 1.0))
         assert arc.jumps[-1].transition == "not unique"
+
+
+class TestTouches:
+    """x = (1 - t)^n comes to zero with a speed of zero."""
+
+    @pytest.mark.parametrize("n", [2, 3, 4, 5])
+    @pytest.mark.parametrize("start", [0.0, 1.0])
+    def test_the_first_derivative_that_is_not_zero_decides(self, n, start):
+        system = one(rates=lambda t, x, z, p: (-n * (1.0 - t) ** (n - 1) + z.d,))
+        arc = simulate(system, ((1.0 - start) ** n,), (start, 2.0))
+        expected = 1.0 if n % 2 == 0 else 0.0
+        assert arc.status.ok
+        assert arc.x[-1, 0] == pytest.approx(expected, abs=1e-12)
+        assert arc.mode[-1] == ("free" if n % 2 == 0 else "d")
 
 
 class TestNoneAndSeveral:

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-from hybrid import periodic_orbit, simulate
+from hybrid import Pair, complementarity, periodic_orbit, simulate
 from tests.hybrid.transform.pairs.circuits import battery, bridge, half_wave, oscillator, smoothed
 
 
@@ -127,6 +127,37 @@ class TestBattery:
             return (p["V"] * abs(np.sin(t)) - p["R"] * i[0]) / p["L"]
 
         np.testing.assert_allclose(arc(times, "i"), reference(rate, 1.0, times), atol=1e-8)
+
+
+def test_two_phases_whose_currents_overlap():
+    # Both currents are held at zero at times, each by the rate of its own diode, with a common coil.
+    R, M = 1.0, np.array([[0.5, 0.2], [0.2, 0.5]])
+    inverse = np.linalg.inv(M)
+
+    def source(t):
+        return np.array([np.sin(t) + 0.2, np.sin(t - 2.0)])
+
+    def rates(t, x, z, p):
+        u = [np.sin(t) + 0.2 - R * (x.a + x.b) + z.a, np.sin(t - 2.0) - R * (x.a + x.b) + z.b]
+        return [inverse[i, 0] * u[0] + inverse[i, 1] * u[1] for i in range(2)]
+
+    pairs = [Pair("a", w=lambda t, x, z, p: x.a), Pair("b", w=lambda t, x, z, p: x.b)]
+    arc = simulate(complementarity(state=("a", "b"), rates=rates, pairs=pairs), (0.0, 0.0), (0.0, 10.0))
+    assert set(map(str, arc.mode)) == {"free", "a", "b", "a+b"}
+
+    # Moreau's time stepping: an implicit Euler step with one complementarity problem.
+    h, x = 5e-3, np.zeros(2)
+    implicit = np.linalg.inv(M + h * R)
+    for k in range(1, 2001):
+        free = implicit @ (M @ x + h * source(k * h))
+        for active in ([], [0], [1], [0, 1]):
+            z = np.zeros(2)
+            z[active] = np.linalg.solve((h * implicit)[active][:, active], -free[active])
+            x = free + h * implicit @ z
+            if (z > -1e-9).all() and (x > -1e-9).all():
+                break
+        if k % 100 == 0:
+            np.testing.assert_allclose(arc(k * h), x, atol=5e-3)
 
 
 def test_the_oscillator_with_a_bridge_is_a_damped_one():
