@@ -102,7 +102,8 @@ class Ending:
 
 
 NO_WAY_ON = (
-    "Change the parameters (less friction), or the start; the result holds everything up to that time."
+    "Change the parameters (of contacts: less friction), or the start; the result holds everything up to "
+    "that time."
 )
 
 

@@ -100,10 +100,11 @@ class PairGrowth(Deciding):
 
     def _manifold(self, watch: Watch, place: Place) -> Manifold:
         """What is known to be zero at an event."""
-        zero = [*self._held(watch)]
-        if watch.event.kind == REACHES:
-            zero.append(self.made[watch.now].regime.levels(watch.event.which)[0])
-        return self.judge.manifold(zero, place)
+        held = self._held(watch)
+        if watch.event.kind != REACHES:
+            return self.judge.manifold(held, place)
+        value, rate = self.made[watch.now].regime.levels(watch.event.which, 2)
+        return self.judge.manifold([*held, value], place, (value, rate))
 
     def _held(self, watch: Watch) -> Vector:
         return [] if watch.event.kind == BEGINS else self.made[watch.now].regime.holds

@@ -14,7 +14,7 @@ from hybrid.expression.evaluation import Program
 from hybrid.expression.graph import all_replaced
 from hybrid.expression.linear import Vector
 from hybrid.expression.nodes import ONE, ZERO, Expression
-from hybrid.expression.operations import And, Not
+from hybrid.expression.operations import And, LessEqual, Not
 from hybrid.system.growth import Place
 from hybrid.transform.deciding import NothingDecided, Written
 from hybrid.transform.pairs.equations import Equations, Sides, values_at
@@ -102,9 +102,11 @@ class Judge:
         found.points = []
         return found
 
-    def manifold(self, zero: Sequence[Expression], place: Place) -> Manifold:
-        """The points around a state at which expressions are zero."""
-        return Manifold(self.equations.symbols, zero, place)
+    def manifold(
+        self, zero: Sequence[Expression], place: Place, falls: tuple[Expression, Expression] | None = None
+    ) -> Manifold:
+        """The points around a state at which expressions are zero; ``falls`` as for `Manifold`."""
+        return Manifold(self.equations.symbols, zero, place, falls)
 
     def kinds(self, sides: Sides, place: Place, manifold: Manifold) -> list[list[Regime]]:
         """The motions that may go on from a state; those of one kind differ in ``z`` and ``w`` alone."""
@@ -128,6 +130,10 @@ class Judge:
         for each in regime.holds:
             value, size = (0.0, 0.0) if manifold.has(each) else self._valued(each, place)
             if not abs(value) <= NOISE * size:
+                return False
+        if manifold.falls is not None and _is_left(regime, manifold.falls):
+            rate, _ = self._valued(manifold.falls[1], place)
+            if rate < 0.0:
                 return False
         return all(self._stays(regime, i, place, manifold) for i in regime.asked)
 
@@ -164,7 +170,7 @@ class Judge:
             return Decision(sides, None, kinds[0][0].active)
         if kinds:
             return Undecided(NOT_UNIQUE, sides, tuple(kind[0].active for kind in kinds))
-        jumps = [*self._jumps(sides, place)]
+        jumps = [*self._jumps(sides, place, manifold)]
         if not jumps:
             return Undecided(NO_SOLUTION, sides)
         kick, kinds = jumps[0]
@@ -176,7 +182,9 @@ class Judge:
             return Undecided(NOT_UNIQUE, sides, tuple(several))
         return Decision(sides, kick.active, several[0])
 
-    def _jumps(self, sides: Sides, place: Place) -> Iterator[tuple[Regime, list[list[Regime]]]]:
+    def _jumps(
+        self, sides: Sides, place: Place, before: Manifold
+    ) -> Iterator[tuple[Regime, list[list[Regime]]]]:
         """The impulses that bring the state to where motions go on, with these motions."""
         t, _, parameters = place
         for kicked in self.cases():
@@ -192,7 +200,7 @@ class Judge:
             if not np.isfinite(after).all() or not all(abs(value) <= SEVERAL * size for value, size in left):
                 continue
             there = t, after, parameters
-            kinds = self.kinds(sides, there, self.manifold(kick.holds, there))
+            kinds = self.kinds(sides, there, self.manifold(kick.holds, there, before.falls))
             if kinds:
                 yield kick, kinds
 
@@ -217,7 +225,7 @@ class Judge:
             conditions += map(not_negative, wanted)
             state, t, parameters = kick.state, place[0], place[2]
             place = t, values_at(self.equations.symbols, Program(state), place), parameters
-            manifold = self.manifold(kick.holds, place)
+            manifold = self.manifold(kick.holds, place, manifold.falls)
         regime = self._regime(decision.sides, decision.active, place)
         after = dict(zip(x, state, strict=True))
         going_on = _going_on(regime, manifold)
@@ -247,10 +255,17 @@ class Judge:
         return found
 
 
+def _is_left(regime: Regime, falls: tuple[Expression, Expression]) -> bool:
+    """Whether a motion is the one that has come to an event: rounding does not tell that it goes on."""
+    return any(regime.levels(i, 2) == [*falls] for i in regime.asked)
+
+
 def _going_on(regime: Regime, manifold: Manifold) -> list[Expression]:
     """The conditions that a motion goes on from a state of a manifold."""
     found = [vanishing(each) for each in regime.holds if not manifold.has(each)]
     for i in regime.asked:
         levels = [each for each in regime.levels(i) if not manifold.has(each)]
         found += [at_first(levels)] if levels else []
+    if manifold.falls is not None and _is_left(regime, manifold.falls):
+        found.append(LessEqual(ZERO, manifold.falls[1]))
     return found

@@ -16,7 +16,9 @@ from hybrid.system.growth import Place
 from hybrid.transform.pairs.equations import values_at
 
 # What is smaller than this share of its terms is zero: it has been computed with rounding.
-NOISE = 1e-9
+NOISE = 1e-14
+# The same at other points than that of a run, where Newton's method has found zeros.
+NEARLY = 1e-9
 # Points at which an expression has to vanish, how far around a state, and the steps of Newton's method.
 POINTS, AROUND, MOST_STEPS = 4, 0.3, 20
 # A step of Newton's method this small is its last; and how much rather it moves the state than time.
@@ -69,10 +71,18 @@ class Manifold:
         Those of the model.
     zero
         The expressions.
+    falls
+        What has come to zero from above just now, with its rate: it cannot go on if that is negative.
     """
 
-    def __init__(self, symbols: Any, zero: Sequence[Expression], place: Place) -> None:
-        self.symbols, self.place = symbols, place
+    def __init__(
+        self,
+        symbols: Any,
+        zero: Sequence[Expression],
+        place: Place,
+        falls: tuple[Expression, Expression] | None = None,
+    ) -> None:
+        self.symbols, self.place, self.falls = symbols, place, falls
         self.zero = tuple(each for each in zero if each is not ZERO)
         self.known: dict[Expression, bool] = dict.fromkeys(self.zero, True)
 
@@ -124,7 +134,7 @@ class Manifold:
         values = values_at(self.symbols, program, place)
         value, slopes, size = values[0], values[1 : len(scale) + 1], values[len(scale) + 1]
         largest = size + np.abs(slopes) @ scale
-        return bool(np.isfinite(largest)) and abs(value) <= NOISE * largest
+        return bool(np.isfinite(largest)) and abs(value) <= NEARLY * largest
 
     def _with_slopes(self, expressions: Sequence[Expression]) -> Program:
         """Each expression with its derivatives in the state and in time."""
