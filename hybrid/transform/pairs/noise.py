@@ -10,7 +10,8 @@ import numpy as np
 
 from hybrid.expression.derivatives import jacobian_of
 from hybrid.expression.evaluation import Program
-from hybrid.expression.nodes import ZERO, Expression, Number, add, multiply, power
+from hybrid.expression.graph import in_order, is_positive
+from hybrid.expression.nodes import ZERO, Expression, add, multiply, power
 from hybrid.expression.operations import Absolute, And, Less, LessEqual, Or
 from hybrid.system.growth import Place
 from hybrid.transform.pairs.equations import values_at
@@ -27,13 +28,17 @@ FOUND, SLOWER = 1e-13, 1e-6
 
 def size_of(expression: Expression) -> Expression:
     """The sum of the sizes of the terms of an expression."""
-    if expression.is_sum:
-        return add(*map(size_of, expression.args))
-    if expression.is_product:
-        return multiply(*map(size_of, expression.args))
-    if expression.is_power and isinstance(expression.args[1], Number) and expression.args[1].value > 0:
-        return power(size_of(expression.args[0]), expression.args[1])
-    return Absolute(expression)
+    found: dict[Expression, Expression] = {}
+    for each in in_order([expression]):
+        if each.is_sum:
+            found[each] = add(*(found[part] for part in each.args))
+        elif each.is_product:
+            found[each] = multiply(*(found[part] for part in each.args))
+        elif each.is_power and is_positive(each.args[1]):
+            found[each] = power(found[each.args[0]], each.args[1])
+        else:
+            found[each] = Absolute(each)
+    return found[expression]
 
 
 def not_negative(expression: Expression) -> Expression:
