@@ -292,9 +292,6 @@ def start_of(family: Family, arc: HybridArc, period: float, values: np.ndarray) 
         forcing = family.period(values) / family.periods
         times = times - forcing * np.floor(times[0] / forcing)
     family = attrs.evolve(family.latest, route=route, counted=counted, least=least, held=None)
-    # A system that grows may have got modes for this run.
-    family = attrs.evolve(family, system=arc.system)
-    family = attrs.evolve(family, route=route, counted=counted, least=least, held=None)
     first = family.around(Loop(x, times, values))
     if first is None:
         return None
