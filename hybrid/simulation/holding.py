@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from hybrid.compiler.compiled import compile_system
 from hybrid.system.derivatives import evaluate
-from hybrid.system.elements import Mode
+from hybrid.system.elements import Function, Mode
 from hybrid.system.graph import HybridSystem
 from hybrid.system.variables import Variables
 
@@ -17,16 +18,16 @@ MOST_STEPS = 6
 
 
 def tangent_projection(
-    mode: Mode, variables: Variables, t: float, x: np.ndarray, parameters: np.ndarray
+    system: HybridSystem, mode: Mode, t: float, x: np.ndarray, parameters: np.ndarray
 ) -> np.ndarray:
     """The projection ``(n, n)`` onto the directions along which all that a mode holds stays zero.
 
     ``n`` is the number of components with tangent vectors. Held components, and parameters that count as
     such, stay as they are: the others follow what the mode holds.
     """
-    gradients = _gradients(mode, variables, t, x, parameters)
+    gradients, moving = _gradients(system, mode, t, x, parameters), system.variables.moving
     projection = np.eye(gradients.shape[1])
-    projection[: variables.moving] -= _back(gradients, variables.moving) @ gradients
+    projection[:moving] -= _back(gradients, moving) @ gradients
     return projection
 
 
@@ -47,7 +48,7 @@ def drawn_back(
         off = evaluate(variables, held.holds, t, found, parameters)
         if off is None:
             return x
-        step = _back(_gradients(held, variables, t, found, parameters), variables.moving) @ off
+        step = _back(_gradients(system, held, t, found, parameters), variables.moving) @ off
         length = float(np.abs(step).max())
         if length >= before or length == 0.0:
             break
@@ -65,24 +66,34 @@ def _back(gradients: np.ndarray, moving: int) -> np.ndarray:
 
 
 def _gradients(
-    mode: Mode, variables: Variables, t: float, x: np.ndarray, parameters: np.ndarray
+    system: HybridSystem, mode: Mode, t: float, x: np.ndarray, parameters: np.ndarray
 ) -> np.ndarray:
     """Derivatives of what a mode holds, from the expressions, by central differences if there are none."""
+    assert mode.holds is not None, "this is asked of modes that hold something"
+    variables, known = system.variables, compile_system(system).plans
+    n, key = variables.tangent_dimension, ("slopes of what is held", mode.name)
+    if key not in known:
+        known[key] = _slopes(mode.holds, variables)
+    if known[key] is not None:
+        return np.asarray(evaluate(variables, known[key], t, x, parameters)).reshape(-1, n)
+    columns = []
+    for i in range(n):
+        step = STEP * max(abs(x[i]), 1.0) * np.eye(len(x))[i]
+        ends = [evaluate(variables, mode.holds, t, x + sign * step, parameters) for sign in (1.0, -1.0)]
+        columns.append((ends[0] - ends[1]) / (2.0 * step[i]))
+    return np.array(columns).T
+
+
+def _slopes(holds: Function, variables: Variables) -> Function | None:
+    """The derivatives of what is held, row by row, as a model function; None if it cannot be traced."""
     from hybrid.expression.derivatives import jacobian_of
     from hybrid.expression.evaluation import expressed
     from hybrid.expression.tracing import TraceError, model_symbols, trace
 
-    assert mode.holds is not None, "this is asked of modes that hold something"
-    n = variables.tangent_dimension
     try:
-        traced = trace(mode.holds, variables.components, variables.parameter_names)
+        traced = trace(holds, variables.components, variables.parameter_names)
     except TraceError:
-        columns = []
-        for i in range(n):
-            step = STEP * max(abs(x[i]), 1.0) * np.eye(len(x))[i]
-            ends = [evaluate(variables, mode.holds, t, x + sign * step, parameters) for sign in (1.0, -1.0)]
-            columns.append((ends[0] - ends[1]) / (2.0 * step[i]))
-        return np.array(columns).T
-    symbols = model_symbols(variables.dimension, len(variables.parameter_names))
-    flat = [each for row in jacobian_of(traced, symbols.x[:n]) for each in row]
-    return np.asarray(evaluate(variables, expressed(flat), t, x, parameters)).reshape(len(traced), n)
+        return None
+    x = model_symbols(variables.dimension, len(variables.parameter_names)).x
+    rows = jacobian_of(traced, x[: variables.tangent_dimension])
+    return expressed([each for row in rows for each in row])

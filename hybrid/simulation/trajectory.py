@@ -278,7 +278,7 @@ class Trajectory:
         if self.holds:
             mode = self.system.modes[self.run.mode]
             place = self.t, self.x, self.parameters
-            matrix = tangent_projection(mode, self.system.variables, *place) @ matrix
+            matrix = tangent_projection(self.system, mode, *place) @ matrix
         if self.system.age is not None and not has_age(self.system, self.mode):
             matrix = matrix * (np.arange(len(matrix)) != self.system.age)[:, None]
         put_tangents(self.run.y, self.model.dimension, matrix)

@@ -333,7 +333,7 @@ class _Window:
         case, mode = self.case, self.case.mode_of(self.jump.source)
         if mode.holds is None:
             return np.eye(len(self.scale))
-        return tangent_projection(mode, case.system.variables, self.begin, self.start, case.values)
+        return tangent_projection(case.system, mode, self.begin, self.start, case.values)
 
     def _central(self, step: float) -> np.ndarray:
         columns = []
