@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from hybrid.expression.graph import contains, in_order, once, rewritten, with_arguments
-from hybrid.expression.linear import LinearEquations, dot, equations_of_solution, inputs_of
+from hybrid.expression.linear import LinearEquations, dot, equations_of_solution
 from hybrid.expression.nodes import (
     HALF,
     MINUS_ONE,
@@ -84,8 +84,9 @@ def _partials(expressions: tuple[Expression, ...], wanted: frozenset[Symbol]) ->
         mask |= each.mask
     known: dict[Expression, dict[Symbol, Expression]] = {}
     columns: dict[LinearEquations, dict[Symbol, list[Expression]]] = {}
-    for node in in_order(expressions, inputs_of):
-        solves = equations_of_solution(node)
+    ordered, solutions = _with_equations(expressions)
+    for node in ordered:
+        solves = solutions.get(node)
         if not node.mask & mask:
             known[node] = {}
         elif isinstance(node, Symbol):
@@ -100,6 +101,25 @@ def _partials(expressions: tuple[Expression, ...], wanted: frozenset[Symbol]) ->
         else:
             known[node] = _from_arguments(node, known)
     return [known[each] for each in expressions]
+
+
+def _with_equations(
+    expressions: Iterable[Expression],
+) -> tuple[list[Expression], dict[Expression, tuple[LinearEquations, int]]]:
+    """Every node behind what its derivative is computed from, and the equations of those that solve some.
+
+    Derivatives are solutions, too: more becomes known while they are made.
+    """
+    solutions: dict[Expression, tuple[LinearEquations, int]] = {}
+
+    def inputs(node: Expression) -> Iterable[Expression]:
+        found = equations_of_solution(node)
+        if found is None:
+            return node.args
+        solutions[node] = found
+        return found[0].inputs
+
+    return in_order(expressions, inputs), solutions
 
 
 def _columns(
@@ -163,16 +183,17 @@ def directional(expressions: Iterable[Expression], seeds: Mapping[Symbol, Expres
     """Derivatives along a vector, with one seed per symbol; common factors stay together."""
     expressions = [*expressions]
     along: dict[Expression, Expression] = {}
-    solutions: dict[LinearEquations, list[Expression]] = {}
-    for node in in_order(expressions, inputs_of):
-        solves = equations_of_solution(node)
+    slopes: dict[LinearEquations, list[Expression]] = {}
+    ordered, solutions = _with_equations(expressions)
+    for node in ordered:
+        solves = solutions.get(node)
         if isinstance(node, Symbol):
             along[node] = seeds.get(node, ZERO)
         elif solves is not None:
             equations, place = solves
-            if equations not in solutions:
-                solutions[equations] = equations.derivative(along.__getitem__)
-            along[node] = solutions[equations][place]
+            if equations not in slopes:
+                slopes[equations] = equations.derivative(along.__getitem__)
+            along[node] = slopes[equations][place]
         elif isinstance(node, Select):
             along[node] = Select(node.args[0], *(along[each] for each in node.args[1:]))
         else:

@@ -7,7 +7,7 @@ larger one. So the equations are remembered with the solution: its derivative al
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -121,12 +121,6 @@ def equations_of_solution(expression: Expression) -> tuple[LinearEquations, int]
     return _known.get(expression)
 
 
-def inputs_of(expression: Expression) -> Iterable[Expression]:
-    """What the derivative of an expression is computed from: its arguments, or what its equations hold."""
-    known = _known.get(expression)
-    return expression.args if known is None else known[0].inputs
-
-
 def _remember(equations: LinearEquations, solution: Vector) -> None:
     """Know these unknowns by their equations, but for those from which the equations are made."""
     reached: set[Expression] = set()
@@ -135,7 +129,8 @@ def _remember(equations: LinearEquations, solution: Vector) -> None:
         each = waiting.pop()
         if each not in reached:
             reached.add(each)
-            waiting += [*each.args, *inputs_of(each)]
+            known = _known.get(each)
+            waiting += [*each.args, *(() if known is None else known[0].inputs)]
     for k, each in enumerate(solution):
         if each.args and each not in reached:
             _known.setdefault(each, (equations, k))

@@ -26,8 +26,9 @@ def tangent_projection(
     such, stay as they are: the others follow what the mode holds.
     """
     gradients, moving = _gradients(system, mode, t, x, parameters), system.variables.moving
+    back, along = _back_and_along(gradients, moving)
     projection = np.eye(gradients.shape[1])
-    projection[:moving] -= _back(gradients, moving) @ gradients
+    projection[:moving, :moving], projection[:moving, moving:] = along, -back @ gradients[:, moving:]
     return projection
 
 
@@ -48,7 +49,8 @@ def drawn_back(
         off = evaluate(variables, held.holds, t, found, parameters)
         if off is None:
             return x
-        step = _back(_gradients(system, held, t, found, parameters), variables.moving) @ off
+        back, _ = _back_and_along(_gradients(system, held, t, found, parameters), variables.moving)
+        step = back @ off
         length = float(np.abs(step).max())
         if length >= before or length == 0.0:
             break
@@ -57,12 +59,19 @@ def drawn_back(
     return found
 
 
-def _back(gradients: np.ndarray, moving: int) -> np.ndarray:
-    """The shortest changes ``(moving, h)`` of the state that take one unit of each held quantity away."""
+def _back_and_along(gradients: np.ndarray, moving: int) -> tuple[np.ndarray, np.ndarray]:
+    """The shortest changes ``(moving, h)`` that take one unit of each held quantity away; what stays.
+
+    What stays is the projection ``(moving, moving)`` onto the directions that change none: exactly zero
+    where there is none.
+    """
     rows = gradients[:, :moving]
     sizes = np.linalg.norm(rows, axis=1)
     units = np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
-    return np.asarray(np.linalg.pinv(rows * units[:, None], rcond=DEPENDENT) * units)
+    left, values, right = np.linalg.svd(rows * units[:, None])
+    rank = int(np.sum(values > DEPENDENT * values[0])) if values[0] > 0.0 else 0
+    back = (right[:rank].T / values[:rank]) @ left[:, :rank].T * units
+    return back, right[rank:].T @ right[rank:]
 
 
 def _gradients(

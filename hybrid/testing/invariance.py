@@ -60,6 +60,8 @@ def check_cut(case: Case) -> None:
         discard("several jumps at one instant may cross the cut together")
     times = [case.t0, *run.arc.jumps.t, run.t1]
     j = int(case.fraction * (len(times) - 1))
+    if not times[j + 1] > times[j]:
+        discard("two jumps meet where the run would be cut")
     t = times[j] + case.fraction * (times[j + 1] - times[j])
     x, mode = run.arc(t), _mode_after(case, j)
     speed = case.evaluate(case.rates_of(mode), t, x) / run.scale

@@ -54,7 +54,8 @@ def check_laws(case: Case) -> None:
     >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
     >>> check_laws(case)
     """
-    for check in law_checks(as_case(case).laws).values():
+    case = as_case(case)
+    for check in law_checks(case.laws).values():
         check(case)
 
 

@@ -179,7 +179,10 @@ def _in_numbers(level: Level, case: Combination) -> Outcome:
 
 def _consistent(reached: Outcome) -> list[Expression]:
     """That a case is consistent."""
-    return [_not_negative(node(value), node(noise)) for value, noise in reached.conditions]
+    found = [_not_negative(node(value), node(noise)) for value, noise in reached.conditions]
+    for value, noise in reached.zeros:
+        found += [_not_negative(node(value), node(noise)), _not_positive(node(value), node(noise))]
+    return found
 
 
 def _not_negative(value: Expression, noise: Expression) -> Expression:

@@ -140,11 +140,15 @@ class Outcome:
         By rows: forces or impulses; speeds or accelerations.
     conditions
         Pairs ``(value, noise)``: the case is consistent if no value is negative by more than its noise.
+    zeros
+        Pairs ``(value, noise)``, no value of which may be more than its noise: contacts that lean slip
+        unless what the others hold keeps them from it.
     """
 
     forces: list[Any]
     after: list[Any]
     conditions: list[tuple[Any, Any]]
+    zeros: list[tuple[Any, Any]]
 
 
 def outcome(
@@ -169,7 +173,9 @@ def outcome(
     after = [speed + dot(row, forces) for speed, row in zip(level.before, level.delassus, strict=True)]
     for row, target in wanted:
         after[row] = target
-    return Outcome(forces, after, [*_conditions(level, case, stuck, forces, after)])
+    leaning = [i for i, lean in enumerate(case.leans) if lean is not None]
+    zeros = [(after[level.across(i)] - level.stops[i], level.noise[level.across(i)]) for i in leaning]
+    return Outcome(forces, after, [*_conditions(level, case, stuck, forces, after)], zeros)
 
 
 def matrix(level: Level, case: Combination) -> np.ndarray:
@@ -278,6 +284,12 @@ def bound(level: Level, case: Combination, i: int, forces: Sequence[Any]) -> Any
     return most
 
 
-def holds(conditions: Sequence[tuple[float, float]]) -> bool:
-    """Whether numbers are not negative by more than their noise."""
-    return all(value >= -NOISE * noise for value, noise in conditions)
+def is_at_rest(level: Level, i: int, after: Sequence[float]) -> bool:
+    """Whether a contact does not slip afterwards but for noise, in numbers."""
+    return abs(after[level.across(i)]) <= NOISE * level.noise[level.across(i)]
+
+
+def holds(reached: Outcome) -> bool:
+    """Whether a case is consistent, in numbers."""
+    positive = all(value >= -NOISE * noise for value, noise in reached.conditions)
+    return positive and all(abs(value) <= NOISE * noise for value, noise in reached.zeros)

@@ -15,6 +15,7 @@ from hybrid.transform.contacts.problem import (
     Outcome,
     correlations,
     holds,
+    is_at_rest,
     outcome,
 )
 from hybrid.transform.contacts.statuses import HELD, IDLE, OPEN, SIGNS, STICKS, Statuses
@@ -48,10 +49,11 @@ def consistent(level: Level, options: Sequence[Sequence[str]], stuck: Sequence[i
     """
     found = []
     for case in sorted(_cases(level, options), key=_forces):
-        if any(case.statuses[i] in SIGNS and _cannot_slip(level, case, i) for i in stuck):
-            continue
         reached = outcome(level, case, stuck)
-        if reached is not None and holds(reached.conditions):
+        if reached is None or not holds(reached):
+            continue
+        slipping = [i for i in stuck if case.statuses[i] in SIGNS]
+        if not any(is_at_rest(level, i, reached.after) and _cannot_slip(level, case, i) for i in slipping):
             found.append(Found(case, reached))
     return found
 

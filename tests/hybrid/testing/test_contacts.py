@@ -18,6 +18,7 @@ from hybrid.testing import (
     check_dimensions,
     check_gaps,
     check_impacts,
+    check_laws,
     check_reads,
     check_system,
     run_settings,
@@ -252,3 +253,10 @@ def test_a_guard_that_runs_replace_by_a_plain_one_is_no_slip_in_a_derivative():
         transitions=[Transition("a", "b", Guard(lambda t, x, p: (x.q - 1.0) ** 3, +1))],
     )
     check_derivatives(Case(cubic, {}, "a", (0.4,), 0.0, 1.0))
+
+
+def test_a_case_that_a_user_writes_has_the_modes_that_its_run_makes():
+    system = thrown()
+    case = Case(system, system.parameters, "free", (0.0, 1.0, 1.0, 0.0), 0.0, 1.5)
+    for check in (check_gaps, check_contact_forces, check_impacts, check_laws):
+        check(case)

@@ -18,7 +18,7 @@ from hybrid.kernels.types.options import INLINE, KERNEL, exported
 LEAST = 1e-6
 # It is more than the rounding of a rate whose terms cancel, as that of what a contact holds: more than this
 # share of the fastest rate, both in units of the tolerances.
-ROUNDED = 1e-9
+CANCELLED = 1e-9
 # A jump times the step is less than so many tolerances: methods see a jump by a thousandth of it, or more.
 MOST_TOLERANCES = 1e3
 # The step is halved so many times towards the largest change. At a jump most of the change is still there,
@@ -61,7 +61,7 @@ def _jumps_between(model, method, run, t, span, work):
     for i in range(model.dimension):
         before, after = work.field[i], work.field_after[i]
         tolerance = _tolerance(method, run, i, work)
-        least = max(LEAST * (abs(before) + abs(after)), ROUNDED * fastest * tolerance)
+        least = max(LEAST * (abs(before) + abs(after)), CANCELLED * fastest * tolerance)
         some = abs(after - before) > least
         hidden = abs(after - before) * span < MOST_TOLERANCES * tolerance
         if some and hidden and _rate_jumps(model, run, t, i, before, after, work):
