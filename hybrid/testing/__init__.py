@@ -4,6 +4,8 @@
 own tests with ``@given(cases(system))``.
 """
 
+import sys
+
 from hybrid.testing.case import Case, Run
 from hybrid.testing.check import check_system
 from hybrid.testing.contacts import (
@@ -17,7 +19,12 @@ from hybrid.testing.derivatives import check_derivatives
 from hybrid.testing.dimensions import check_dimensions
 from hybrid.testing.ends import check_ends, check_sides_after
 from hybrid.testing.engine import Engine
-from hybrid.testing.errors import PropertyError, discard
+from hybrid.testing.errors import (
+    HIDDEN_FROM_PYTEST,
+    PropertyError,
+    discard,
+    is_property_error,
+)
 from hybrid.testing.events import check_jumps, check_sides
 from hybrid.testing.fields import PiecewiseAffineField, piecewise_affine_fields
 from hybrid.testing.functions import check_angles, check_compiled, check_period
@@ -97,3 +104,7 @@ __all__ = [
     "small_systems",
     "states",
 ]
+
+# Below the line of a test that fails pytest tells the property, and not the way to it through this package.
+for _module in [module for name, module in sys.modules.items() if name.startswith("hybrid.testing.")]:
+    setattr(_module, HIDDEN_FROM_PYTEST, is_property_error)

@@ -16,7 +16,6 @@ from hybrid.system.functions import condition_function, field_function, reset_fu
 from hybrid.system.graph import HybridSystem
 from hybrid.system.members import full_name, groups_in, member_name
 from hybrid.testing.case import Case, lasting
-from hybrid.testing.ends import whole_run
 from hybrid.testing.sizes import sizes_of_terms
 
 # Values may differ by this share of the sizes of their terms: sums of members are added in another order.
@@ -74,7 +73,7 @@ def check_alike(case: Case, name: str, told: str) -> None:
 
 def _points(case: Case) -> Iterator[tuple[float, np.ndarray, str]]:
     """Times, states and modes of a run."""
-    arc = whole_run(case)
+    arc = case.whole
     rows = np.flatnonzero(lasting(arc))
     for i in rows[np.unique(np.linspace(0, len(rows) - 1, MOST_POINTS).astype(int))] if len(rows) else ():
         yield float(arc.t[i]), arc.x[i], str(arc.mode[i])
@@ -83,7 +82,7 @@ def _points(case: Case) -> Iterator[tuple[float, np.ndarray, str]]:
 def _compare(case: Case, exchange: Exchange, told: str, t: float, x: np.ndarray, mode: str) -> None:
     """Fail if a function of the mode gives something else for exchanged members."""
     variables, p = case.system.variables, case.values
-    moved, changed, scale = x[exchange.state], p[exchange.parameters], np.abs(whole_run(case).x).max(axis=0)
+    moved, changed, scale = x[exchange.state], p[exchange.parameters], np.abs(case.whole.x).max(axis=0)
     for what, function, other in _functions(case.system, mode, exchange):
         value = partial(_value, case, t=t, parameters=p, function=function)
         own = value(x)

@@ -306,8 +306,14 @@ class Case:
             discard(found)
         return found
 
+    @property
+    def whole(self) -> HybridArc:
+        """The whole run, however it ends; the example is discarded if no mode allows the start."""
+        arc = self.whole_if_any
+        return discard("no mode allows the start") if arc is None else arc
+
     @cached_property
-    def whole(self) -> HybridArc | None:
+    def whole_if_any(self) -> HybridArc | None:
         """The whole run, however it ends; None if no mode allows the start."""
         if self.mode is None:
             return None
@@ -320,7 +326,7 @@ class Case:
         """The largest absolute value of a guard on the whole run, in any mode."""
         if transition.name not in self._guard_sizes:
             arc, function = self.whole, transition.guard.function
-            rows = [] if arc is None else zip(arc.t, arc.x, strict=True)
+            rows = zip(arc.t, arc.x, strict=True)
             found = [evaluate(self.system.variables, function, t, x, self.values) for t, x in rows]
             sizes = [abs(float(values[0])) for values in found if values is not None]
             self._guard_sizes[transition.name] = max(sizes, default=0.0)
@@ -339,7 +345,7 @@ class Case:
     def _run(self) -> Run | str:
         if self.mode is None:
             return f"no mode allows the start: {lies_beyond(self)}"
-        arc, cut = self.whole, ""
+        arc, cut = self.whole_if_any, ""
         if arc is None:
             return "a run cannot start there"
         t1 = self.t1

@@ -17,6 +17,7 @@ from hypothesis.strategies import SearchStrategy
 
 from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
+from hybrid.display.progress import Progress, progress_bar
 from hybrid.solvers import Solver
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.growth import finished, stage_of
@@ -122,6 +123,7 @@ def check_system(
     examples: int = 50,
     solver: Solver = TIGHT,
     engine: Engine = LIBRARY,
+    progress: bool | None = None,
 ) -> SystemReport:
     """Check every property of a hybrid system on drawn runs, and report the smallest failure in words.
 
@@ -150,6 +152,9 @@ def check_system(
         Method and tolerances, which should be tight.
     engine
         Computes runs and derivatives.
+    progress
+        Whether to show progress bars; by default in a terminal or a notebook, after two seconds. pytest shows
+        them with ``-s``. A bar goes on beyond ``examples`` while a failing case is made smaller.
 
     Returns
     -------
@@ -173,6 +178,7 @@ def check_system(
     """
     as_system("system", system)
     examples = arguments.count("examples", examples, 1)
+    progress = None if progress is None else arguments.flag("progress", progress)
     given = {
         "invariant": invariant,
         "equal": equal,
@@ -201,7 +207,8 @@ def check_system(
             **given,
         )
         coverage = Coverage.of(system)
-        _search(drawn, coverage.see, examples)
+        with progress_bar(examples, "Runs drawn", progress, "run") as bar:
+            _search(drawn, coverage.see, examples, bar)
         # The modes of a system that is made in stages are those that these runs need.
         if system.growth is None or system.growth.current is system:
             break
@@ -220,7 +227,8 @@ def check_system(
     tally.once(FIRES, coverage.check)
     if system.period is not None:
         tally.once(SHORTEST, lambda: check_shortest_period(system, coverage.cases))
-    _search(drawn, tally.judge, examples)
+    with progress_bar(examples, "Runs judged", progress, "run") as bar:
+        _search(drawn, tally.judge, examples, bar)
     for case in aimed:
         tally.judge(case)
     return tally.report(flip is None)
@@ -283,7 +291,7 @@ def _properties(
     return properties
 
 
-def _search(drawn: SearchStrategy[Case], judge: Callable[[Case], None], examples: int) -> None:
+def _search(drawn: SearchStrategy[Case], judge: Callable[[Case], None], examples: int, bar: Progress) -> None:
     """Judge drawn cases; raise the failure of the smallest case that fails."""
 
     @hypothesis_settings(
@@ -298,6 +306,7 @@ def _search(drawn: SearchStrategy[Case], judge: Callable[[Case], None], examples
     )
     @with_drawn(drawn)
     def search(case: Case) -> None:
+        bar.update()
         judge(case)
 
     failure = None

@@ -12,7 +12,6 @@ from hybrid.expression.evaluation import Program
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.jumps import Jump
 from hybrid.testing.case import Case, as_case, jump_told, lasting
-from hybrid.testing.ends import whole_run
 from hybrid.testing.errors import discard
 from hybrid.transform.contacts.decide import POISSON
 from hybrid.transform.contacts.growth import SETTLING, ContactGrowth, contacts_of
@@ -48,7 +47,7 @@ class Touching:
         growth = contacts_of(as_case(case).system)
         if growth is None:
             discard("the system is not made by mechanics")
-        return cls(case, whole_run(case), growth)
+        return cls(case, case.whole, growth)
 
     def view(self, t: float, x: np.ndarray) -> View:
         """Speeds, accelerations and coefficients at a point."""

@@ -96,7 +96,7 @@ class Coverage:
     def see(self, case: Case) -> None:
         """Count the run of a case."""
         self.cases.append(case)
-        arc = case.whole
+        arc = case.whole_if_any
         if arc is None:
             return
         self.jumps.update(jump.transition for jump in arc.jumps if jump.kind != "limit")

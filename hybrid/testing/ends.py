@@ -7,7 +7,6 @@ from itertools import zip_longest
 import attrs
 import numpy as np
 
-from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.jumps import Jump
 from hybrid.status import StatusCode
 from hybrid.testing.case import Case, as_case, guard_beyond, jump_told
@@ -47,11 +46,11 @@ def check_ends(case: Case) -> None:
     >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
     >>> check_ends(case)
     """
-    arc = whole_run(case)
+    arc = as_case(case).whole
     if arc.status.code not in BROKEN:
         return
     neighbour = attrs.evolve(case, x0=tuple(x * (1.0 + NEAR / (i + 2)) for i, x in enumerate(case.x0)))
-    if whole_run(neighbour).status.code not in BROKEN:
+    if neighbour.whole.status.code not in BROKEN:
         discard("the run breaks, and runs from starts nearby do not")
     if arc.status.code == StatusCode.STUCK and np.abs(arc.x[-1]).max() > GROWN * np.abs(arc.x[0]).max():
         discard("jumps follow one another within the rounding of time, since the state grows without bound")
@@ -78,20 +77,12 @@ def check_sides_after(case: Case) -> None:
     >>> case = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6)
     >>> check_sides_after(case)
     """
-    arc = whole_run(case)
+    arc = as_case(case).whole
     jumps = list(arc.jumps)
     for jump, after in zip_longest(jumps, jumps[1:]):
         # A run that breaks at a jump may end before the next.
         if after is not None or arc.status.code not in BROKEN:
             _check_landing(case, jump, after)
-
-
-def whole_run(case: object) -> HybridArc:
-    """The whole run of a case; the example is discarded if no mode allows its start."""
-    arc = as_case(case).whole
-    if arc is None:
-        discard("no mode allows the start")
-    return arc
 
 
 def _check_landing(case: Case, jump: Jump, after: Jump | None) -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from hypothesis.errors import UnsatisfiedAssumption
+
+# Under this name pytest looks for what says whether it leaves the lines of a module out of a traceback.
+HIDDEN_FROM_PYTEST = "__tracebackhide__"
 
 
 class PropertyError(AssertionError):
@@ -30,6 +33,15 @@ class PropertyError(AssertionError):
     def __init__(self, text: str, time: float | None = None) -> None:
         super().__init__(text)
         self.time = time
+
+
+# The name under which it is imported and printed.
+PropertyError.__module__ = "hybrid.testing"
+
+
+def is_property_error(caught: Any) -> bool:
+    """Whether pytest has caught a property that fails, for which the lines of this library say nothing."""
+    return isinstance(caught.value, PropertyError)
 
 
 def discard(reason: str) -> NoReturn:

@@ -87,8 +87,8 @@ def check_limits(case: Case) -> None:
     >>> check_limits(case)
     """
     arc = as_case(case).whole
-    limits = [] if arc is None else [jump for jump in arc.jumps if jump.kind == "limit" and jump.target]
-    if arc is None or not limits:
+    limits = [jump for jump in arc.jumps if jump.kind == "limit" and jump.target]
+    if not limits:
         discard("no chatter with a limit on the run")
     for jump in limits:
         _check_stays(case, jump, arc)

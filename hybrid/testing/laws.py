@@ -17,7 +17,6 @@ from hybrid.system.outputs import function_in
 from hybrid.system.rows import fires, plain_firing
 from hybrid.testing.alike import check_alike
 from hybrid.testing.case import Case, as_case, jump_told, lasting, matrix_told
-from hybrid.testing.ends import whole_run
 from hybrid.testing.errors import PropertyError, discard
 from hybrid.testing.sizes import sizes_of_terms
 
@@ -83,25 +82,39 @@ def law_checks(laws: Laws) -> dict[str, Callable[[Case], None]]:
 
 def declared_too(case: Case, check: Callable[[Case], None]) -> None:
     """Check a case; where that fails, say so if it holds with the parameters as declared."""
+    error = _failure(case, check)
+    if error is None:
+        return
+    declared = case.system.parameters
+    changed = [name for name, value in case.parameters.items() if value != declared[name]]
+    other = attrs.evolve(case, parameters=dict(declared))
+    if not (changed and _holds(other, check)):
+        raise error
+    if not np.array_equal(other.whole.jumps.transition, case.whole.jumps.transition):
+        raise error
+    # With the traceback of the failure: Hypothesis takes failures of two places for two mistakes.
+    raise PropertyError(
+        f"{error}\n  It holds with the parameters as declared: a number stands where a parameter belongs "
+        f"({', '.join(changed)}), or parameters= needs narrower ranges.",
+        error.time,
+    ).with_traceback(error.__traceback__)
+
+
+def _failure(case: Case, check: Callable[[Case], None]) -> PropertyError | None:
+    """How a case fails; None if it holds."""
     try:
         check(case)
     except PropertyError as error:
-        declared = case.system.parameters
-        changed = [name for name, value in case.parameters.items() if value != declared[name]]
-        if not changed:
-            raise
-        other = attrs.evolve(case, parameters=dict(declared))
-        try:
-            check(other)
-        except (PropertyError, UnsatisfiedAssumption):
-            raise error from None
-        if not np.array_equal(whole_run(other).jumps.transition, whole_run(case).jumps.transition):
-            raise
-        raise PropertyError(
-            f"{error}\n  It holds with the parameters as declared: a number stands where a parameter belongs "
-            f"({', '.join(changed)}), or parameters= needs narrower ranges.",
-            error.time,
-        ) from None
+        return error
+    return None
+
+
+def _holds(case: Case, check: Callable[[Case], None]) -> bool:
+    """Whether a case can be judged, and holds."""
+    try:
+        return _failure(case, check) is None
+    except UnsatisfiedAssumption:
+        return False
 
 
 def _told(law: Law, kind: str) -> str:
@@ -119,7 +132,7 @@ def _across_told(law: Law) -> str:
 
 def _check_value(case: Case, law: Law, kind: str) -> None:
     """Fail if a quantity is negative, or not zero, anywhere on the whole run."""
-    arc = whole_run(case)
+    arc = case.whole
     tolerance = TOLERANCE * _size_on(case, law, arc)
     for i in _rows(case, law, arc):
         value = _value(case, law, arc, i)
@@ -153,7 +166,7 @@ def _of_mode(case: Case, mode: str, kind: str) -> str:
 
 def _check_change(case: Case, law: Law, kind: str) -> None:
     """Fail if a quantity changes by more than its law allows, along the flow or at a jump."""
-    arc, start, last = whole_run(case), 0.0, -1
+    arc, start, last = case.whole, 0.0, -1
     tolerance = TOLERANCE * _size_on(case, law, arc)
     for i in _rows(case, law, arc):
         value = _value(case, law, arc, i)
@@ -216,7 +229,7 @@ def _check_across(case: Case, law: Law) -> None:
         with np.errstate(all="ignore"), fires(plain_firing(row)):
             return np.asarray(law.quantity(t, variables.state_view(minus), variables.state_view(plus), p))
 
-    scale = np.tile(np.abs(whole_run(case).x).max(axis=0), 2)
+    scale = np.tile(np.abs(case.whole.x).max(axis=0), 2)
     for jump in _jumps_of(case, law.of):
         there = partial(rule, jump.t, row=jump.row or 0)
         found = there(jump.x_minus, jump.x_plus)
@@ -246,7 +259,7 @@ def _of_halves(rule: Callable[..., Any], n: int, both: np.ndarray) -> Any:
 
 def _check_continuous(case: Case, name: str, told: str) -> None:
     """Fail if the state or the field jumps at a transition."""
-    arc = whole_run(case)
+    arc = case.whole
     for jump in _jumps_of(case, name):
         assert jump.target is not None
         (fields, sizes) = sized(case, case.rates_of(jump.source), jump.t, jump.x_minus, arc)
@@ -279,7 +292,7 @@ def _check_continuous(case: Case, name: str, told: str) -> None:
 
 def _jumps_of(case: Case, name: str | None) -> Iterator[Jump]:
     """The jumps of a transition on the whole run, without the limits of chatters."""
-    jumps = [jump for jump in whole_run(case).jumps if jump.kind != "limit"]
+    jumps = [jump for jump in case.whole.jumps if jump.kind != "limit"]
     found = [jump for jump in jumps if name in case.names_of_transition(jump.transition)]
     if not found:
         discard(f"no run took {name!r}")

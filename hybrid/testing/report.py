@@ -7,10 +7,13 @@ from collections.abc import Mapping
 
 import attrs
 
+from hybrid.display.tables import table
+
 # A property is reported as hardly checked if less than this share of its examples could be judged.
 HARDLY = 0.1
 # Reasons told of each kind, the most frequent ones.
 MOST_TOLD = 3
+COLUMNS = ("", "examples", "not judged", "property", "why not judged")
 
 
 @attrs.frozen
@@ -49,6 +52,14 @@ class PropertyReport:
     def hardly(self) -> bool:
         """Whether it was checked on few of its examples."""
         return self.checked and self.examples < HARDLY * (self.examples + self.discarded.total())
+
+    @property
+    def row(self) -> tuple[str, str, str, str, str]:
+        """The result as a row of a table: see ``COLUMNS``."""
+        verdict = "HARDLY CHECKED" if self.hardly else "holds" if self.checked else "NOT CHECKED"
+        passed = str(self.discarded.total() or "")
+        why = _most_common(self.discarded) if self.discarded else ""
+        return verdict, str(self.examples), passed, self.name, why
 
     def __str__(self) -> str:
         if not self.checked:
@@ -122,10 +133,9 @@ class SystemReport:
 
     def __str__(self) -> str:
         lines = [f"{self.name}: no property failed.", *self._matters()]
-        held = [found for found in self.properties if found.checked and not found.hardly]
-        most = max((found.examples for found in held), default=0)
-        names = [f"{found.name} ({found.examples})" if found.discarded else found.name for found in held]
-        lines.append(f"- Holds on {most} examples, or as many as are given: {'; '.join(names)}.")
+        # What is hardly known comes first.
+        order = sorted(self.properties, key=lambda found: (found.checked, not found.hardly))
+        lines.append(table(COLUMNS, [found.row for found in order]))
         return "\n".join(lines)
 
     def _matters(self) -> list[str]:
@@ -144,10 +154,6 @@ class SystemReport:
             lines.append(f"- ENDED EARLY: {_reasons(self.ends)}.")
         if self.cut:
             lines.append(f"- CUT, for all but laws and ends: {_reasons(self.cut)}.")
-        lines += [f"- HARDLY CHECKED: {found}." for found in self.properties if found.hardly]
-        unchecked = [str(found) for found in self.properties if not found.checked]
-        if unchecked:
-            lines.append(f"- NOT CHECKED: {'; '.join(unchecked)}.")
         for mode, jumps in self.discontinuities.items():
             lines.append(
                 f"- The field of mode {mode!r} jumps where {jumps}: tangent vectors are not valid beyond. "

@@ -52,8 +52,8 @@ def check_ticks(case: Case) -> None:
     """
     arc = as_case(case).whole
     every = [each for each in case.system.transitions if each.clock]
-    if arc is None or not every:
-        discard("no transition has a clock" if arc else "no mode allows the start")
+    if not every:
+        discard("no transition has a clock")
     clocks = [each for each in every if each.clock and each.clock.number != Delay.number]
     for each in every:
         if isinstance(each.clock, UnderWay):

@@ -1,5 +1,6 @@
 """The library's own systems and randomly drawn systems have every property."""
 
+import re
 import subprocess
 import sys
 
@@ -200,7 +201,7 @@ class TestReport:
         assert JUMPS in report.unchecked
         assert report.never_seen == ("bounce",)
         text = str(report)
-        assert f"{JUMPS} (no event on the run)" in text
+        assert re.search(f"^NOT CHECKED  0 +5 +{JUMPS} +no event on the run$", text, re.MULTILINE)
         assert "NEVER SEEN: bounce. Give ranges that reach them." in text.splitlines()[1]
         assert "elastic= is not given" in text
 
@@ -212,7 +213,25 @@ class TestReport:
         )
         (found,) = (each for each in report.properties if each.name == JUMPS)
         assert 0 < found.examples < 4
-        assert f"- HARDLY CHECKED: {JUMPS}: held on {found.examples} examples" in str(report)
+        assert re.search(f"^HARDLY CHECKED  {found.examples} .* {JUMPS}", str(report), re.MULTILINE)
+
+    def test_a_table_has_one_row_per_property_and_begins_with_what_is_not_known(self):
+        report = check_system(models.bouncing_ball(), examples=5)
+        title, *rows = str(report).splitlines()[-len(report.properties) - 1 :]
+        assert title.split() == ["examples", "not", "judged", "property", "why", "not", "judged"]
+        column = title.index("property")
+        verdicts = [row.split("  ")[0] for row in rows]
+        assert verdicts == sorted(verdicts, key=["NOT CHECKED", "HARDLY CHECKED", "holds"].index)
+        assert {row[column:].split("  ")[0] for row in rows} == {each.name for each in report.properties}
+
+    def test_bars_are_shown_when_asked_for(self, capsys):
+        check_system(models.bouncing_ball(), examples=5, progress=True)
+        shown = capsys.readouterr().err
+        assert "Runs drawn" in shown
+        assert "Runs judged" in shown
+        assert "/5 " in shown
+        check_system(models.bouncing_ball(), examples=5)
+        assert capsys.readouterr().err == ""
 
     def test_nothing_to_judge_is_no_success(self):
         with pytest.raises(PropertyError, match=r"bouncing ball: none of \d+ runs could be judged"):
