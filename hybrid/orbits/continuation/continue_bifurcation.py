@@ -58,7 +58,7 @@ class CodimensionTwo:
     ----------
     kind
         ``"cusp"``, ``"fold-flip"``, ``"1:1 resonance"``, ``"1:2 resonance"``, ``"1:3 resonance"``,
-        ``"1:4 resonance"``, a kind and what meets it there such as ``"grazing-fold"``, or a kind
+        ``"1:4 resonance"``, a kind and the fold or flip that it meets, such as ``"grazing-fold"``, or a kind
         ``"... at a change"``: the transitions of the orbit change.
     values
         The two parameters by name.
@@ -206,8 +206,9 @@ def continue_bifurcation(
     ----------
     bifurcation
         Of a `Branch` or an `EquilibriumBranch`: any kind but a branch point, which two parameters do not
-        keep. A zero of a function in ``events=`` is followed where the function passes zero smoothly, not
-        where it jumps to the other sign.
+        keep. A Hopf point is followed as one of an `EquilibriumBranch`, not of the cycles that end there. A
+        zero of a function in ``events=`` is followed where the function passes zero smoothly, not where it
+        jumps to the other sign.
     over
         Names of two parameters with their ranges: ``{"omega": (6.5, 8.5), "P": (300.0, 700.0)}``.
     outputs

@@ -88,9 +88,12 @@ def continue_orbit(
     """The branch of a periodic orbit over a parameter, both ways from the orbit, and the bifurcations on it.
 
     Steps are taken along the branch (pseudo-arclength), so that it may turn back at folds. Each orbit is
-    corrected by the shortest Newton step of the state, the period and the parameter together, with the
-    derivatives of the run in all of them. A step is the next point if the corrections contract and are small
-    beside the step. The section moves along the orbit, so that no jump is near it.
+    corrected by the shortest Newton step of all its unknowns together: the states after its jumps, the times
+    of these, and the parameter. A step is the next point if the corrections contract and are small beside the
+    step.
+
+    Where the transitions of the orbit change, as at a grazing, the branch goes on with the orbits beyond the
+    change, if there are any: a change is no end. The status says where the branch ends.
 
     Quantities that the system declares with ``laws=Laws(conserved=...)`` are held at their values on the
     first orbit, as far as the jumps keep them, and the status names them. All orbits of the branch have these
@@ -120,6 +123,8 @@ def continue_orbit(
         Method and tolerances, by default ``Taylor(rtol=1e-12, atol=1e-14)``.
     max_steps
         Largest number of steps in either direction.
+    progress
+        Whether to show a progress bar; by default in a terminal or a notebook, after two seconds.
 
     Returns
     -------

@@ -1,0 +1,54 @@
+"""What docstrings and pages list is what branches find: kinds and ends."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import hybrid
+from hybrid.orbits.continuation import continue_orbit, curve
+from hybrid.orbits.continuation.event import KINDS
+from hybrid.orbits.equilibria import branch as of_equilibria
+from hybrid.orbits.equilibria import curves
+
+DOCS = Path(__file__).parents[3] / "docs"
+OF_TWO_PARAMETERS = {"cusp", "fold-flip", *curve.RESONANCES, *curve.STRONG}
+
+
+def table(page, title):
+    """The first cells of the rows below the title row of a table."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    found = re.search(rf"^\| {re.escape(title)} \|.*\n\|[-|]+\n((?:\|.*\n)+)", text, re.MULTILINE)
+    assert found, f"{page} has no table with the title {title}"
+    return [row.split("|")[1].strip() for row in found[1].splitlines()]
+
+
+def named(page, title):
+    """The names in backquotes in the first cells of the rows, but those of cells that give examples."""
+    cells = (cell for cell in table(page, title) if not cell.startswith("such as"))
+    return [name.strip('"') for cell in cells for name in re.findall(r"`([^`]+)`", cell)]
+
+
+def quoted(thing):
+    """The kinds in the entry ``kind`` of the docstring of a class, but those that stand for others."""
+    entry = re.search(r"\n    kind\n((?:        .*\n)+)", thing.__doc__)[1]
+    return re.findall(r'``"([^"`.]+)"``', entry.replace('such as ``"grazing-fold"``', ""))
+
+
+@pytest.mark.parametrize(
+    ("kinds", "thing", "page", "title"),
+    [
+        (KINDS, hybrid.Bifurcation, "branches.md", "kind"),
+        (of_equilibria.KINDS, hybrid.EquilibriumBifurcation, "equilibria.md", "kind"),
+        (OF_TWO_PARAMETERS, hybrid.CodimensionTwo, "branches.md", "kind of point"),
+        (curves.MESSAGES, hybrid.SpecialEquilibrium, "equilibria.md", "kind of point"),
+    ],
+    ids=["orbits", "equilibria", "curves of orbits", "curves of equilibria"],
+)
+def test_docstring_and_page_list_the_kinds_that_are_found(kinds, thing, page, title):
+    assert sorted(set(quoted(thing))) == sorted(kinds)
+    assert sorted(named(page, title)) == sorted(kinds)
+
+
+def test_the_page_lists_each_end_of_a_branch_in_the_words_of_the_status():
+    assert sorted(table("branches.md", "... at")) == sorted(continue_orbit.ENDS.values())
