@@ -2,7 +2,8 @@
 
 The pages of this folder, and those that are made from the sources (one per public name, one per model), go to
 ``build/site/source``; the table of published numbers is computed anew, which takes half a minute. Sphinx
-makes ``build/site/html`` of them. A warning is an error.
+makes ``build/site/html`` of them: in another folder, which takes this place when it is complete. A warning is
+an error.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
@@ -47,6 +50,7 @@ kernelspec:
 ---
 
 """
+STAGES = 3
 LINK = re.compile(r"\]\((?!https?://|#)([^)#\s]+)(#[^)\s]*)?\)")
 
 
@@ -57,23 +61,48 @@ def main() -> None:
     given = parser.parse_args()
     output = given.output
     source = output / "source"
+    kind = "linkcheck" if given.links else "html"
     shutil.rmtree(source, ignore_errors=True)
+    tell(1, f"writing the pages into {source}")
     write_pages(source)
+    tell(2, "computing the published numbers")
     renew(source / "published.md")
-    command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "--quiet"]
-    if given.links:
+    tell(3, "asking the linked sites" if given.links else "executing the tutorials and writing the site")
+    with whole(output / kind) as unfinished:
+        code = build(kind, source, unfinished, output)
+        if code:
+            sys.exit(code)
+    print("All links are answered." if given.links else f"Open {output / kind / 'index.html'}")
+
+
+def tell(number: int, stage: str) -> None:
+    print(f"Site, {number} of {STAGES}: {stage} ...", flush=True)
+
+
+@contextmanager
+def whole(folder: Path) -> Iterator[Path]:
+    """A folder to write into, which takes the place of another one when the block ends without an error."""
+    unfinished = folder.with_name(f"{folder.name}-unfinished")
+    shutil.rmtree(unfinished, ignore_errors=True)
+    yield unfinished
+    shutil.rmtree(folder, ignore_errors=True)
+    unfinished.rename(folder)
+
+
+def build(kind: str, source: Path, into: Path, output: Path) -> int:
+    """Run Sphinx, which tells in a terminal at which page it is; returns its exit status."""
+    command = [sys.executable, "-m", "sphinx", "--fail-on-warning", "--keep-going", "--builder", kind]
+    command += ["--doctree-dir", str(output / f"doctrees-{kind}")]
+    if not sys.stdout.isatty():
+        command += ["--quiet"]
+    if kind == "linkcheck":
         # No page has to be executed for its links.
         command += ["--define", "nb_execution_mode=off"]
-    kind = "linkcheck" if given.links else "html"
-    command += ["--builder", kind, "--doctree-dir", str(output / f"doctrees-{kind}")]
     # A notebook draws into its page, whatever this process draws into.
     environment = {name: value for name, value in os.environ.items() if name != "MPLBACKEND"}
     environment["JUPYTER_PATH"] = str(output / "jupyter")
     write_kernel(output / "jupyter")
-    done = subprocess.run([*command, str(source), str(output / kind)], check=False, env=environment)
-    if done.returncode:
-        sys.exit(done.returncode)
-    print("All links are answered." if given.links else f"Open {output / kind / 'index.html'}")
+    return subprocess.run([*command, str(source), str(into)], check=False, env=environment).returncode
 
 
 def write_pages(source: Path) -> None:

@@ -1,8 +1,10 @@
 """Imports follow the order of docs/architecture.md without circles, and files stay small."""
 
 import ast
+import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import NamedTuple
 
@@ -73,7 +75,21 @@ KERNEL_ROOMS = tuple(
 DOOR = "hybrid.kernels.types.numba_door"
 INNER_PACKAGES = (("numba", "core"), ("numba", "np"))
 PUBLIC_PARTS = ("numba", "numba.extending", "numba.types", "llvmlite", "llvmlite.binding", "llvmlite.ir")
-HEAVY = ("matplotlib", "networkx", "numba", "pandas", "pint", "scipy", "xarray")
+HEAVY = (
+    "bokeh",
+    "dask",
+    "hypothesis",
+    "matplotlib",
+    "networkx",
+    "numba",
+    "pandas",
+    "panel",
+    "pint",
+    "scipy",
+    "tqdm",
+    "xarray",
+    "zarr",
+)
 MAX_LINES = 500
 
 
@@ -255,11 +271,38 @@ def test_every_module_says_what_it_is_for(package):
     assert not offences, report(offences)
 
 
-def test_importing_hybrid_is_light():
-    program = f"import sys, hybrid; print(*sorted(sys.modules.keys() & {set(HEAVY)!r}))"
+# What a fresh process does, and which of the heavy packages it may load on the way, of those it must.
+STEPS = {
+    "import hybrid, models": ((), ()),
+    "arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 1.0))": ((), ()),
+    "orbit = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))": (("scipy",), ()),
+    "hybrid.testing": (("scipy", "hypothesis"), ("hypothesis",)),
+    "arc.system.graph": (("scipy", "hypothesis", "networkx"), ("networkx",)),
+}
+
+
+def test_a_package_is_loaded_by_the_call_that_needs_it():
+    """The first column of the table in docs/install.md; datasets load what xarray finds."""
+    told = f"print(*sorted(sys.modules.keys() & {set(HEAVY)!r}))"
+    program = "\n".join(["import sys", *(f"{step}\n{told}" for step in STEPS)])
     done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == [], f"import hybrid also imports {done.stdout}"
+    for (step, (allowed, needed)), line in zip(STEPS.items(), done.stdout.splitlines(), strict=True):
+        loaded = set(line.split())
+        assert set(needed) <= loaded <= set(allowed), f"{step} loads {line}"
+
+
+def test_the_page_on_installing_names_each_heavy_package_of_the_library():
+    """With what loads it; extras are named with their packages."""
+    page = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    needed = {re.match("[A-Za-z]+", each)[0] for each in project["dependencies"]}
+    for package in needed & set(HEAVY) - {"tqdm"}:
+        assert f"| `{package}` |" in page, package
+    for extra in ("explore", "grid"):
+        assert f"| `'.[{extra}]'` |" in page
+    pages = [path.read_text(encoding="utf-8") for path in (ROOT / "docs").rglob("*.md")]
+    assert not [text for text in pages if "hybrid-systems[" in text]
 
 
 def test_every_name_of_the_package_can_be_asked_for():

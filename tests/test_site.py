@@ -3,6 +3,7 @@
 import importlib
 import json
 import re
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -71,6 +72,20 @@ def test_tutorials_are_notebooks_on_the_site(maker, site):
             "cells"
         ]
         assert [cell["cell_type"] for cell in cells].count("code") == page.count("```python\n")
+
+
+def test_a_site_takes_its_place_when_it_is_complete(maker, tmp_path):
+    place = tmp_path / "html"
+    for text in ("old", "new"):
+        with maker.whole(place) as unfinished:
+            unfinished.mkdir()
+            (unfinished / "index.html").write_text(text)
+        assert [path.name for path in tmp_path.iterdir()] == ["html"]
+    with suppress(SystemExit), maker.whole(place) as unfinished:
+        unfinished.mkdir()
+        (unfinished / "index.html").write_text("half")
+        raise SystemExit(1)
+    assert (place / "index.html").read_text() == "new"
 
 
 def test_a_value_without_a_comment_is_refused(maker):

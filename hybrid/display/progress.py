@@ -42,7 +42,7 @@ def progress_bar(
     With None a bar appears in a terminal or a notebook after two seconds. ``done`` units are done already.
     If nobody knows the ``total`` (None), the bar counts.
     """
-    if shown is False or (shown is None and not _is_watched()):
+    if shown is False or (shown is None and not is_watched()):
         yield SILENT
         return
     with warnings.catch_warnings():
@@ -55,6 +55,6 @@ def progress_bar(
         yield bar
 
 
-def _is_watched() -> bool:
+def is_watched() -> bool:
     """Whether standard error is a terminal, or the program a notebook."""
     return "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty())

@@ -11,9 +11,10 @@ from hybrid import arguments
 from hybrid.errors import HybridError
 from hybrid.explorer.calls import OPENING
 from hybrid.explorer.subject import Subject, subject
+from hybrid.simulation.extra import how_to_install
 from hybrid.system.graph import HybridSystem
 
-INSTALL = "hybrid.explore needs Panel and Bokeh. Install them: pip install 'hybrid-systems[explore]'."
+INSTALL = f"hybrid.explore needs Panel and Bokeh. {how_to_install('explore')}"
 THE_SYSTEM = "# system is the model that was given to hybrid.explore.\n"
 LOCAL = ("localhost", "127.0.0.1", "::1")
 

@@ -1,4 +1,4 @@
-"""Packages of the extra ``grid``, imported when a call first needs them."""
+"""Packages of extras, imported when a call first needs them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,13 @@ from typing import Any
 from hybrid.errors import HybridError
 
 
+def how_to_install(extra: str) -> str:
+    """A sentence that says how the packages of an extra are installed."""
+    return f"Install the extra {extra!r} in the folder of the sources of hybrid: pip install '.[{extra}]'."
+
+
 def needed(package: str, argument: str) -> Any:
-    """An optional package.
+    """An optional package of the extra ``grid``.
 
     Raises
     ------
@@ -20,8 +25,7 @@ def needed(package: str, argument: str) -> Any:
         return importlib.import_module(package)
     except ImportError:
         raise HybridError(
-            f"{argument} needs the package {package}, which is not installed. "
-            "Install it with: pip install 'hybrid-systems[grid]'."
+            f"{argument} needs the package {package}, which is not installed. {how_to_install('grid')}"
         ) from None
 
 

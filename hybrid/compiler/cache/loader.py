@@ -32,13 +32,14 @@ from hybrid.compiler.cache.folder import (
 from hybrid.compiler.cache.kernel import file_of, kernels_in
 from hybrid.compiler.interrupts import between_passes
 from hybrid.compiler.llvm.engine import cpu, processor
+from hybrid.display.progress import Progress, is_watched, progress_bar
 from hybrid.expression.branches import PARSER
 from hybrid.kernels.types.kinds import text_of
 
 DRIVER = "hybrid.kernels.drive"
 LIMITS = "hybrid.kernels.limit.go"
 # While this process compiles the driver, a second one compiles what every run needs too, and then what most
-# runs never call.
+# runs never call. While the run goes on it compiles all others, which a later call may need.
 IN_SECOND = (
     "hybrid.kernels.jumps.jump",
     "hybrid.kernels.jumps.plain",
@@ -76,7 +77,9 @@ ALL_KERNELS = (
 )
 # The modules that decide the form of the files.
 FORM = (PACKAGE / "compiler" / "cache" / "kernel.py", PACKAGE / "compiler" / "cache" / "seal.py")
-MESSAGE = "hybrid: compiling the kernels, once for all models (under a minute) ..."
+TITLE = "hybrid: compiling the kernels, once for all models"
+# Seconds between two looks at which of them are done.
+LOOK = 0.5
 
 
 # Threads that need the same kernels compile and load them once: what a second load replaces would be freed
@@ -88,7 +91,8 @@ _LOADED: dict[str, SimpleNamespace] = {}
 def load_kernels(module: str = DRIVER) -> SimpleNamespace:
     """The kernels that a module exports, by name, compiled now or loaded from the cache.
 
-    A line on standard error announces the compilation, once per process.
+    A bar shows the compilation in a terminal or a notebook; elsewhere a line on standard error announces it,
+    once per process.
     """
     if module not in _LOADED:
         with _LOADING:
@@ -101,9 +105,10 @@ def loaded(module: str) -> SimpleNamespace:
     """As ``load_kernels``, for a module that this process has not loaded, or loads anew."""
     content = _on_disk(module)
     if content is None:
-        with announced(MESSAGE):
+        with _shown(module):
             if module == DRIVER:
-                second_process.start([each for each in IN_SECOND if not is_kept(each)])
+                others = dict.fromkeys((*IN_SECOND, *ALL_KERNELS))
+                second_process.start([each for each in others if each != DRIVER and not is_kept(each)])
             elif module in IN_SECOND:
                 second_process.wait_for(lambda: is_kept(module))
                 content = _on_disk(module)
@@ -111,6 +116,33 @@ def loaded(module: str) -> SimpleNamespace:
                 content = compiled(module)
                 keep(_path(module), content)
     return SimpleNamespace(**kernels_in(content))
+
+
+@contextmanager
+def _shown(module: str) -> Iterator[None]:
+    """Show how many kernels of the first run are compiled, or that this one is, which it does not need."""
+    if not is_watched():
+        with announced(f"{TITLE} ..."):
+            yield
+        return
+    first = (DRIVER, *IN_SECOND)
+    left = {each for each in (first if module in first else (module,)) if not is_kept(each)}
+    total, ended = len(first) if module in first else 1, threading.Event()
+
+    def look(bar: Progress) -> None:
+        while not ended.wait(LOOK):
+            done = set(filter(is_kept, left))
+            left.difference_update(done)
+            bar.update(len(done))
+
+    with progress_bar(total, TITLE, None, "module", done=total - len(left)) as bar:
+        looking = threading.Thread(target=look, args=(bar,), daemon=True)
+        looking.start()
+        try:
+            yield
+        finally:
+            ended.set()
+            looking.join()
 
 
 def compiled(module: str) -> bytes:
