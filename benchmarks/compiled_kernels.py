@@ -19,11 +19,12 @@ class CompiledKernels:
         sys.path.insert(0, str(folder))
         # A file may change twice within the precision of the times that tell old byte code.
         sys.dont_write_bytecode = True
+        from hybrid.__main__ import ALL_KERNELS
         from hybrid.compiler.cache import loader, store
 
         self._models = store._compiler()
-        self._keys = {module: loader.kernels_key(module) for module in loader.ALL_KERNELS}
-        for module in loader.ALL_KERNELS:
+        self._keys = {module: loader.kernels_key(module) for module in ALL_KERNELS}
+        for module in ALL_KERNELS:
             loader.compiled(module)
         loader.kernels_key.cache_clear()
         loader.sources_key.cache_clear()

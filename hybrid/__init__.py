@@ -153,18 +153,24 @@ __all__ = [
 ]
 
 
-# Modules that are imported when they are first asked for: plot and testing need Matplotlib and Hypothesis.
-# The function explore needs both, and lyapunov.
-ON_DEMAND = ("measures", "plot", "testing")
+# What is imported when it is first asked for: its module, and its name there unless it is the module. plot
+# and testing need Matplotlib and Hypothesis. explore needs lyapunov, which stands on this package: no other
+# name leads upwards.
+ON_DEMAND = {
+    "measures": ("hybrid.measures", ""),
+    "plot": ("hybrid.plot", ""),
+    "testing": ("hybrid.testing", ""),
+    "explore": ("hybrid.explorer.explore", "explore"),
+}
 
 
 def __getattr__(name: str) -> Any:
-    if name in ON_DEMAND:
-        return import_module(f"hybrid.{name}")
-    if name == "explore":
-        return import_module("hybrid.explorer.explore").explore
-    raise AttributeError(f"module 'hybrid' has no attribute {name!r}")
+    if name not in ON_DEMAND:
+        raise AttributeError(f"module 'hybrid' has no attribute {name!r}")
+    module, inner = ON_DEMAND[name]
+    found = import_module(module)
+    return getattr(found, inner) if inner else found
 
 
 def __dir__() -> list[str]:
-    return [*__all__, "__version__", "explore", *ON_DEMAND]
+    return [*__all__, "__version__", *ON_DEMAND]

@@ -16,10 +16,12 @@ from pathlib import Path
 
 from hybrid.compiler.cache import second_process, shipped
 from hybrid.compiler.cache.folder import cache_directory
-from hybrid.compiler.cache.loader import ALL_KERNELS, is_kept, is_shipped, portable
+from hybrid.compiler.cache.loader import ALL_KERNELS as OF_HYBRID
+from hybrid.compiler.cache.loader import IN_ANOTHER_PROCESS, is_kept, is_shipped, portable
 from hybrid.display.progress import progress_bar
 from hybrid.explorer.command import add_options, explore_model
 
+ALL_KERNELS = (*OF_HYBRID, "lyapunov.kernels", "lyapunov.study.kernels")
 # Seconds between two checks of the progress.
 LOOK = 0.3
 PORTABLE = """\
@@ -55,7 +57,7 @@ def parser() -> argparse.ArgumentParser:
 
 def compile_kernels(processes: int) -> list[str]:
     """Compile every kernel that is not on disk yet, in several processes; returns those that failed."""
-    return _compile(processes, is_kept, [second_process.PROGRAM], {})
+    return _compile(processes, is_kept, [IN_ANOTHER_PROCESS], {})
 
 
 def compile_portable(processes: int, folder: Path) -> list[str]:

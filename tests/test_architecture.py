@@ -91,6 +91,30 @@ HEAVY = (
     "zarr",
 )
 MAX_LINES = 500
+DOTTED = re.compile(r"(hybrid|models|lyapunov)(\.[a-z_0-9]+)+")
+COMPARED = "hybrid.kernels.types.numba_door.part_compiler"
+# Names of modules in strings that may lead up or back: hybrid.explore, the only one that is imported so, and
+# names of kernels with which the compiler compares the name of the one that it compiles.
+KNOWN_WAYS = {("hybrid", "hybrid.explorer.explore")} | {
+    (COMPARED, f"hybrid.kernels.{name}")
+    for name in (
+        "arithmetic.tangent",
+        "steps.series",
+        "guards.first_event",
+        "steps.series_length",
+        "guards.isolate",
+        "guards.form",
+        "guards.roots",
+    )
+}
+# Where the name of an imported module is no literal: what is imported on demand, kernels by their names in
+# the loader, the module of a user's model, and a package of an extra.
+IMPORT_BY_NAME = {
+    "hybrid",
+    "hybrid.compiler.cache.loader",
+    "hybrid.explorer.command",
+    "hybrid.simulation.extra",
+}
 
 
 class Import(NamedTuple):
@@ -115,8 +139,12 @@ def sources(folder):
 
 def imports_of(path):
     """Every import statement of a file, including those inside functions, with relative names resolved."""
+    yield from imports_in_tree(ast.parse(path.read_text(encoding="utf-8"), filename=str(path)), path)
+
+
+def imports_in_tree(tree, path):
     package = path.relative_to(ROOT).parent.parts
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"), filename=str(path))):
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (Import(path, node.lineno, alias.name, "") for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -125,8 +153,51 @@ def imports_of(path):
             yield from (Import(path, node.lineno, module, alias.name) for alias in node.names)
 
 
+def named_in(path):
+    """Modules named in strings as imports: ``"hybrid.kernels.drive"``, or a program with imports of its own.
+
+    A dotted name that is no module of the library is no arrow, see ``arrows``.
+    """
+    tree = ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
+    inside = {id(part) for node in ast.walk(tree) for part in no_imports(node)}
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Constant) or not isinstance(node.value, str) or id(node) in inside:
+            continue
+        if DOTTED.fullmatch(node.value):
+            yield Import(path, node.lineno, node.value, "")
+        elif "import " in node.value:
+            for found in imports_of_program(node.value, path):
+                yield found._replace(line=node.lineno)
+
+
+def no_imports(node):
+    """Strings that import nothing: docstrings, and the literal parts of f-strings."""
+    if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+        yield from (first.value for first in node.body[:1] if isinstance(first, ast.Expr))
+    if isinstance(node, ast.JoinedStr):
+        yield from node.values
+
+
+def imports_of_program(text, path):
+    """Import statements of a program in a string; none if it is no program."""
+    try:
+        return list(imports_in_tree(ast.parse(text), path))
+    except SyntaxError:
+        return []
+
+
 def imports_in(folder):
     return [found for path in sources(folder) for found in imports_of(path)]
+
+
+def imports_and_names_in(folder):
+    """Also those in strings, but for the ways that are known."""
+    named = [found for path in sources(folder) for found in named_in(path)]
+    return imports_in(folder) + [found for found in named if way(found) not in KNOWN_WAYS]
+
+
+def way(found):
+    return module_of(found.path), found.module
 
 
 def report(offences):
@@ -154,7 +225,7 @@ def arrows(*packages):
     """Pairs of modules in which the first imports the second, and the place of the import."""
     modules = {module_of(path) for package in packages for path in sources(package)}
     for package in packages:
-        for found in imports_in(package):
+        for found in imports_and_names_in(package):
             inner = f"{found.module}.{found.name}"
             target = inner if inner in modules else found.module
             if target in modules and target != module_of(found.path):
@@ -196,8 +267,37 @@ def test_an_upward_import_is_seen(tmp_path, monkeypatch):
     ]
 
 
+def test_a_name_in_a_string_is_seen(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "ROOT", tmp_path)
+    program = '"import sys\\nfrom hybrid.compiler.emit import f\\n"'
+    own = f'"""hybrid.compiler.emit"""\nA = "hybrid.compiler.emit"\nB = {program}\n'
+    for name, text in (("system", own), ("compiler", "")):
+        (tmp_path / "hybrid" / name).mkdir(parents=True)
+        (tmp_path / "hybrid" / name / "emit.py").write_text(text)
+    assert [str(found) for found in upward(ROOMS, arrows("hybrid"))] == [
+        "hybrid/system/emit.py:2: import hybrid.compiler.emit",
+        "hybrid/system/emit.py:3: from hybrid.compiler.emit import f",
+    ]
+
+
+def test_each_known_way_by_name_is_there():
+    named = {way(found) for package in PACKAGES for path in sources(package) for found in named_in(path)}
+    assert named >= KNOWN_WAYS
+
+
+def test_modules_are_imported_by_computed_names_in_few_places():
+    def imports_by_name(path):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        called = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
+        names = {getattr(each, "attr", "") or getattr(each, "id", "") for each in called}
+        return bool(names & {"import_module", "__import__"})
+
+    paths = [path for package in PACKAGES for path in sources(package)]
+    assert {module_of(path) for path in paths if imports_by_name(path)} == IMPORT_BY_NAME
+
+
 def test_no_circle_of_imports():
-    """Late imports and imports for types only also count."""
+    """Late imports and imports for types only also count, and names in strings."""
     graph = nx.DiGraph((one, other) for one, other, _ in arrows("hybrid", "models", "lyapunov"))
     circles = [sorted(each) for each in nx.strongly_connected_components(graph) if len(each) > 1]
     assert not circles, circles

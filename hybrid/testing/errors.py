@@ -36,7 +36,7 @@ class PropertyError(AssertionError):
 
 
 # The name under which it is imported and printed.
-PropertyError.__module__ = "hybrid.testing"
+PropertyError.__module__ = __name__.rpartition(".")[0]
 
 
 def is_property_error(caught: Any) -> bool:

@@ -8,7 +8,8 @@ import pytest
 
 import hybrid.__main__ as command
 from hybrid import solvers
-from hybrid.compiler.cache.loader import ALL_KERNELS, DRIVER, IN_SECOND
+from hybrid.__main__ import ALL_KERNELS
+from hybrid.compiler.cache.loader import DRIVER, IN_SECOND
 
 SOURCES = Path(command.__file__).parents[1]
 SMALL = ("hybrid.kernels.steps.step", "hybrid.kernels.evaluate")

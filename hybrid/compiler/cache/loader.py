@@ -49,7 +49,7 @@ IN_SECOND = (
     "hybrid.kernels.guards.isolate",
     LIMITS,
 )
-# All kernels that Python calls or passes on, slowest to compile first.
+# All kernels of this package that Python calls or passes on, slowest to compile first.
 ALL_KERNELS = (
     DRIVER,
     "hybrid.kernels.jumps.jump",
@@ -72,11 +72,16 @@ ALL_KERNELS = (
     "hybrid.kernels.evaluate",
     "hybrid.kernels.runs.initial_mode",
     "hybrid.kernels.steps.step",
-    "lyapunov.kernels",
-    "lyapunov.study.kernels",
 )
 # The modules that decide the form of the files.
 FORM = (PACKAGE / "compiler" / "cache" / "kernel.py", PACKAGE / "compiler" / "cache" / "seal.py")
+# Compiles the modules that it is given.
+IN_ANOTHER_PROCESS = """\
+import sys
+from hybrid.compiler.cache.loader import load_kernels
+for module in sys.argv[1:]:
+    load_kernels(module)
+"""
 TITLE = "hybrid: compiling the kernels, once for all models"
 # Seconds between two looks at which of them are done.
 LOOK = 0.5
@@ -108,7 +113,8 @@ def loaded(module: str) -> SimpleNamespace:
         with _shown(module):
             if module == DRIVER:
                 others = dict.fromkeys((*IN_SECOND, *ALL_KERNELS))
-                second_process.start([each for each in others if each != DRIVER and not is_kept(each)])
+                missing = [each for each in others if each != DRIVER and not is_kept(each)]
+                second_process.start(IN_ANOTHER_PROCESS, missing)
             elif module in IN_SECOND:
                 second_process.wait_for(lambda: is_kept(module))
                 content = _on_disk(module)

@@ -17,23 +17,17 @@ from hybrid.compiler.interrupts import CTRL_C
 
 # Seconds between two looks at what the second process has done.
 LOOK = 0.02
-PROGRAM = """\
-import sys
-from hybrid.compiler.cache.loader import load_kernels
-for module in sys.argv[1:]:
-    load_kernels(module)
-"""
 _helpers: list[subprocess.Popen[bytes]] = []
 
 
-def start(modules: Sequence[str]) -> None:
-    """Compile these kernel modules in a second process, if a second processor is available."""
+def start(program: str, modules: Sequence[str]) -> None:
+    """Run a program that compiles kernel modules in a second process, if a second processor is available."""
     interpreter = bool(sys.executable) and not getattr(sys, "frozen", False)
     if not modules or not interpreter or processors() < 2:
         return
     try:
         helper = subprocess.Popen(
-            [sys.executable, "-c", PROGRAM, *modules],
+            [sys.executable, "-c", program, *modules],
             env=environment(),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,

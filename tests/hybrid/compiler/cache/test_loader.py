@@ -78,7 +78,7 @@ def test_a_second_process_compiles_what_this_one_waits_for_and_then_all_others(o
     monkeypatch.setattr(loader, "compiled", lambda module: b"code")
     monkeypatch.setattr(loader, "keep", lambda path, content: None)
     monkeypatch.setattr(loader, "kernels_in", lambda content: {"code": content})
-    monkeypatch.setattr(loader.second_process, "start", started.extend)
+    monkeypatch.setattr(loader.second_process, "start", lambda program, modules: started.extend(modules))
     assert loader.loaded(loader.DRIVER).code == b"code"
     waited = [module for module in loader.IN_SECOND if module not in on_disk]
     assert started[: len(waited)] == waited

@@ -6,6 +6,7 @@ import subprocess
 import pytest
 
 from hybrid.compiler.cache import second_process
+from hybrid.compiler.cache.loader import IN_ANOTHER_PROCESS
 
 
 @pytest.fixture
@@ -24,7 +25,7 @@ def refuse(monkeypatch):
 
 
 def test_second_process_fills_the_same_cache(empty_cache):
-    second_process.start(["hybrid.kernels.steps.step"])
+    second_process.start(IN_ANOTHER_PROCESS, ["hybrid.kernels.steps.step"])
     second_process.wait_for(lambda: False)
     [folder] = empty_cache.glob("kernels-*")
     assert [path.name for path in folder.iterdir()] == ["hybrid.kernels.steps.step.o"]
@@ -32,29 +33,29 @@ def test_second_process_fills_the_same_cache(empty_cache):
 
 
 def test_what_becomes_of_it_does_not_matter(empty_cache):
-    second_process.start(["hybrid.kernels.no_such_module"])
+    second_process.start(IN_ANOTHER_PROCESS, ["hybrid.kernels.no_such_module"])
     second_process.wait_for(lambda: False)
     assert list(empty_cache.rglob("*.o")) == []
 
 
 def test_nor_whether_it_can_be_started(empty_cache, monkeypatch):
     monkeypatch.setattr("sys.executable", str(empty_cache / "no_such_interpreter"))
-    second_process.start(["hybrid.kernels.steps.step"])
+    second_process.start(IN_ANOTHER_PROCESS, ["hybrid.kernels.steps.step"])
     second_process.wait_for(lambda: False)
 
 
 def test_one_processor_is_left_to_this_process(empty_cache, monkeypatch, refuse):
     monkeypatch.setattr(second_process, "processors", lambda: 1)
-    second_process.start(["hybrid.kernels.steps.step"])
+    second_process.start(IN_ANOTHER_PROCESS, ["hybrid.kernels.steps.step"])
 
 
 def test_nothing_to_compile_starts_nothing(empty_cache, refuse):
-    second_process.start([])
+    second_process.start(IN_ANOTHER_PROCESS, [])
 
 
 def test_neither_does_a_program_that_is_its_own_interpreter(empty_cache, monkeypatch, refuse):
     monkeypatch.setattr("sys.frozen", True, raising=False)
-    second_process.start(["hybrid.kernels.steps.step"])
+    second_process.start(IN_ANOTHER_PROCESS, ["hybrid.kernels.steps.step"])
 
 
 def test_there_is_nothing_to_wait_for_without_a_start():
