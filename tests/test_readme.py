@@ -154,6 +154,13 @@ def test_links_lead_somewhere(page):
         assert (page.parent / target).exists(), target
 
 
+def test_what_is_cited_is_this_version():
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {hybrid.__version__}\n" in citation
+    [page] = re.findall(r"docs/\w+\.md", citation)
+    assert f"`hybrid-systems {hybrid.__version__}`" in (ROOT / page).read_text(encoding="utf-8")
+
+
 def test_the_tests_to_read_first_are_there():
     tests = Path(__file__).parent
     named = re.findall(r"^\| `(\S+\.py)` \|", (tests / "README.md").read_text(encoding="utf-8"), re.MULTILINE)
