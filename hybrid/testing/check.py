@@ -208,7 +208,7 @@ def check_system(
         )
         coverage = Coverage.of(system)
         with progress_bar(examples, "Runs drawn", progress, "run") as bar:
-            _search(drawn, coverage.see, examples, bar)
+            _search(drawn, counted(coverage.see, bar), examples)
         # The modes of a system that is made in stages are those that these runs need.
         if system.growth is None or system.growth.current is system:
             break
@@ -228,7 +228,7 @@ def check_system(
     if system.period is not None:
         tally.once(SHORTEST, lambda: check_shortest_period(system, coverage.cases))
     with progress_bar(examples, "Runs judged", progress, "run") as bar:
-        _search(drawn, tally.judge, examples, bar)
+        _search(drawn, counted(tally.judge, bar), examples)
     for case in aimed:
         tally.judge(case)
     return tally.report(flip is None)
@@ -291,8 +291,21 @@ def _properties(
     return properties
 
 
-def _search(drawn: SearchStrategy[Case], judge: Callable[[Case], None], examples: int, bar: Progress) -> None:
-    """Judge drawn cases; raise the failure of the smallest case that fails."""
+def counted(judge: Callable[[Case], None], bar: Progress) -> Callable[[Case], None]:
+    """A judge that counts its cases on a bar."""
+
+    def judged(case: Case) -> None:
+        bar.update()
+        judge(case)
+
+    return judged
+
+
+def _search(drawn: SearchStrategy[Case], judge: Callable[[Case], None], examples: int) -> None:
+    """Judge drawn cases; raise the failure of the smallest case that fails.
+
+    Hypothesis draws other cases where the text of ``search`` is another one.
+    """
 
     @hypothesis_settings(
         max_examples=examples,
@@ -306,7 +319,6 @@ def _search(drawn: SearchStrategy[Case], judge: Callable[[Case], None], examples
     )
     @with_drawn(drawn)
     def search(case: Case) -> None:
-        bar.update()
         judge(case)
 
     failure = None
