@@ -23,8 +23,8 @@ from benchmarks import exponents_beside
 from benchmarks.common import file_in, heading, options, table
 from benchmarks.exponents_beside import Beside
 from hybrid import Guard, HybridSystem, Mode, Reset, Taylor, Transition
+from hybrid.plot.styles import COLOURS, INK, style
 from lyapunov import lyapunov_spectrum, two_orbit_exponents
-from lyapunov.plot import COLOURS, INK, style
 
 PICTURE = "exponents_work.png"
 # The founding system at omega = 7.40, from an independent computation with 60 digits.
@@ -176,7 +176,7 @@ def draw_work(axes: plt.Axes, curves: Curves) -> None:
 
 
 def picture(path: Path, regular: Curves, chaotic: Curves, beside: Beside) -> None:
-    with style():
+    with style("chart"):
         figure, (axes, below) = plt.subplots(2, 3, figsize=(12.0, 8.4), sharey="row")
         draw(axes[0], regular, "Regular: founding system at 7.40")
         draw_work(axes[1], regular)

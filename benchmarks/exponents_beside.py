@@ -24,9 +24,9 @@ from benchmarks.peers.growth import Growth, Method
 from benchmarks.peers.problem import ATOL_OVER_RTOL
 from benchmarks.problems import always_touching, stored
 from hybrid import DOP853, HybridSystem, PeriodicOrbit, Taylor, periodic_orbit
+from hybrid.plot import COLOURS
 from lyapunov import lyapunov_spectrum
 from lyapunov.directions import first_vectors
-from lyapunov.plot import COLOURS
 
 PERIODS = 500
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)

@@ -235,7 +235,7 @@ NEAREST = {
     "hybrid/plot/arcs.py": ("plot/test_plot.py",),
     "hybrid/plot/graph.py": ("plot/test_plot.py",),
     "hybrid/plot/orbits.py": ("plot/test_arcs.py", "plot/test_plot.py"),
-    "hybrid/plot/style.py": ("plot/test_plot.py", "test_arguments.py"),
+    "hybrid/plot/styles.py": ("plot/test_plot.py", "test_arguments.py"),
     "hybrid/simulation/ending.py": (
         "simulation/test_simulate.py",
         "simulation/test_ending.py",

@@ -23,8 +23,8 @@ from scipy.integrate import DOP853
 import models
 from benchmarks.common import file_in, heading, options, table
 from hybrid import HybridSystem, from_equations, simulate
+from hybrid.plot.styles import COLOURS, INK, style
 from lyapunov import lyapunov_spectrum
-from lyapunov.plot import COLOURS, INK, style
 from tests.reference.plain_models import PLAIN, pair
 
 PICTURE = "plain_equations.png"
@@ -190,7 +190,7 @@ def main() -> None:
         cost()
         return
     colours = dict(zip(("straight", "smoothed", "split"), COLOURS, strict=False))
-    with style():
+    with style("chart"):
         figure, grid = plt.subplots(2, 3, figsize=(11.0, 6.2), layout="constrained")
         for column, make in enumerate((stop_with_preload, dry_friction, block_on_belt)):
             oscillator = make()

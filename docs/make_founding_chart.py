@@ -74,7 +74,7 @@ def draw(store: Path, folder: Path) -> None:
     swept = hybrid.open_store(store)
     # Lines that are not complete yet are left out.
     swept = swept.isel(D=(swept.status != hybrid.StatusCode.NOT_RUN).all("omega").values)
-    with style():
+    with style("chart"):
         figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.6), sharey=True)
         plot_map(swept, ax=left)
         plot_kinds(swept, ax=right)

@@ -130,7 +130,7 @@ def diodes_picture(system: HybridSystem, folder: Path) -> None:
 
 def chart_picture(system: HybridSystem, folder: Path) -> None:
     """Sections and exponents over the forcing frequency, with the attractor followed from row to row."""
-    with style():
+    with style("chart"):
         swept = chart(
             system,
             {"w": np.linspace(1.3, 1.9, 600)},

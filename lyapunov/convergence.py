@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, arguments
-from hybrid.display.tables import with_unit
-from hybrid.plot.style import axes_for, mark
+from hybrid.plot.axes import (
+    axes_for,
+    mark,
+)
+from hybrid.plot.labels import label_of
+from hybrid.plot.legends import small_legend
+from hybrid.plot.picture import Look, picture
+from hybrid.plot.styles import INK, colour_of, dot_size, line_width
 from lyapunov.spectrum import LyapunovSpectrum
 from lyapunov.two_orbit import TwoOrbitExponents
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Distinct for the colour-blind and in grey: M. Okabe, K. Ito, "Color universal design" (2008).
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#555555")
-INK = "#333333"
 MINUS_INFINITY = "minus infinity"
 POINTS_OF_A_LINE = 1500
 FIGURE = (6.4, 3.8)
 
 
+@picture
 def plot_convergence(
     estimates: Mapping[str, ArrayLike],
     *,
@@ -33,8 +37,7 @@ def plot_convergence(
     truth: float | None = None,
     truth_label: str = "exact",
     unit: str = "",
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
+    **look: Unpack[Look],
 ) -> Axes:
     """Estimates of an exponent against the number of intervals.
 
@@ -50,10 +53,6 @@ def plot_convergence(
         Names of the points and of the line in the legend.
     unit
         Unit of the estimates, for the axis.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Examples
     --------
@@ -74,45 +73,42 @@ def plot_convergence(
     for name, text in (("points_label", points_label), ("truth_label", truth_label), ("unit", unit)):
         arguments.instance(name, text, str)
     truth = None if truth is None else arguments.number("truth", truth)
-    (ax,) = axes_for(ax, 1, FIGURE, figsize)
+    (ax,) = axes_for(look, 1, FIGURE)
     # Later lines are thinner, so that both of two coinciding lines are visible.
     widths = (2.2, 0.9) if len(histories) > 1 else (1.3,)
     if truth is not None:
-        ax.axhline(truth, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label=truth_label, zorder=1)
+        ax.axhline(
+            truth, color=INK, linewidth=line_width(0.8), linestyle=(0, (4, 3)), label=truth_label, zorder=1
+        )
     for i, (label, history) in enumerate(histories.items()):
         at = np.unique(np.geomspace(1, len(history) + 0.5, POINTS_OF_A_LINE).astype(int))
         at = at[(at > 0) & (at <= len(history))]
-        width, colour = widths[min(i, 1)], COLOURS[i % len(COLOURS)]
+        width, colour = widths[min(i, 1)], colour_of(i)
         ax.plot(at, history[at - 1], color=colour, label=label, linewidth=width)
         if label in points:
-            ax.plot(*points[label], "o", color=colour, markersize=4.5, markerfacecolor="white")
+            ax.plot(*points[label], "o", color=colour, markersize=dot_size(4.5), markerfacecolor="white")
     if not any(np.isfinite(history).any() for history in histories.values()):
         # Lines without a point give the axes no length.
         ax.set_xlim(1.0, 1.0 + max([1, *map(len, histories.values())]))
     if points:
-        ax.plot([], [], "o", color=INK, markersize=4.5, markerfacecolor="white", label=points_label)
+        ax.plot([], [], "o", color=INK, markersize=dot_size(4.5), markerfacecolor="white", label=points_label)
     ax.set_xscale("log")
     ax.set_xlabel("intervals $M$")
-    ax.set_ylabel(with_unit("exponent estimate", unit))
+    ax.set_ylabel(label_of("exponent estimate", unit))
     ax.grid(True, axis="y")
     if ax.get_legend_handles_labels()[0]:
-        ax.legend()
+        small_legend(ax)
     return ax
 
 
-def plot_spectrum(
-    spectrum: LyapunovSpectrum, *, ax: Axes | None = None, figsize: tuple[float, float] | None = None
-) -> Axes:
+@picture
+def plot_spectrum(spectrum: LyapunovSpectrum, **look: Unpack[Look]) -> Axes:
     """Estimates of the exponents against the number of intervals, with a bar of two standard errors.
 
     Parameters
     ----------
     spectrum
         From :func:`lyapunov.lyapunov_spectrum`, with its history.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Raises
     ------
@@ -138,45 +134,51 @@ def plot_spectrum(
         truth=0.0,
         truth_label="zero",
         unit=spectrum.names.rate.get("units", ""),
-        ax=ax,
-        figsize=figsize,
+        **look,
     )
     values, errors = spectrum.exponents, 2 * spectrum.standard_error
     shown = np.isfinite(values)
     if np.isneginf(values).any():
         mark(ax, [len(spectrum.growths)], "v", INK, MINUS_INFINITY)
-        ax.legend()
+        small_legend(ax)
     for i in np.flatnonzero(shown):
         ax.errorbar(
             len(spectrum.growths),
             values[i],
             errors[i],
-            color=COLOURS[i % len(COLOURS)],
+            color=colour_of(int(i)),
             capsize=3,
-            linewidth=1,
+            linewidth=line_width(1),
         )
-    # The first estimates are far off, so the limits fit the later nine tenths.
-    late = spectrum.history[len(spectrum.growths) // 10 :, shown].ravel()
-    inside = [*(values - errors)[shown], *(values + errors)[shown], *late, 0.0]
-    bottom, top = min(inside), max(inside)
-    margin = 0.1 * (top - bottom) or 1.0
-    ax.set_ylim(bottom - margin, top + margin)
+    _frame(ax, spectrum.history[:, shown], [*(values - errors)[shown], *(values + errors)[shown], 0.0])
     return ax
 
 
-def plot_two_orbits(
-    result: TwoOrbitExponents, *, ax: Axes | None = None, figsize: tuple[float, float] | None = None
-) -> Axes:
+def _frame(ax: Axes, history: np.ndarray, least: list[float]) -> None:
+    """Limits that no curve leaves: the first estimates, which are far off, are left out.
+
+    The height fits the later nine tenths, and the values ``least``.
+    """
+    late = history[len(history) // 10 :].ravel()
+    inside = [*least, *late[np.isfinite(late)]]
+    bottom, top = min(inside), max(inside)
+    margin = 0.1 * (top - bottom) or 1.0
+    bottom, top = bottom - margin, top + margin
+    ax.set_ylim(bottom, top)
+    out = np.flatnonzero(((history < bottom) | (history > top)).any(axis=1))
+    # The row i is the estimate after i + 1 intervals.
+    first, last = (int(out[-1]) + 2 if len(out) else 1), max(len(history), 2)
+    ax.set_xlim(first, last * (last / first) ** 0.03)
+
+
+@picture
+def plot_two_orbits(result: TwoOrbitExponents, **look: Unpack[Look]) -> Axes:
     """Estimates from two orbits over the number of intervals: two that saturate, one that converges.
 
     Parameters
     ----------
     result
         From :func:`lyapunov.two_orbit_exponents`.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Examples
     --------
@@ -193,9 +195,7 @@ def plot_two_orbits(
         "one piece, saturates": result.single_piece,
         "undivided, saturates": result.undivided,
     }
-    return plot_convergence(
-        histories, truth=0.0, truth_label="zero", unit=result.unit, ax=ax, figsize=figsize
-    )
+    return plot_convergence(histories, truth=0.0, truth_label="zero", unit=result.unit, **look)
 
 
 def numbers(name: str, value: object, axes: int) -> np.ndarray:

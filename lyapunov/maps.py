@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
 from hybrid import ArgumentError, StatusCode, arguments
-from hybrid.display.tables import with_unit
-from hybrid.plot.style import axes_for, check_axes, small_legend, told
+from hybrid.plot.axes import (
+    axes_for,
+    check_look,
+    told,
+)
+from hybrid.plot.labels import label_of
+from hybrid.plot.legends import small_legend
+from hybrid.plot.picture import Look, picture
+from hybrid.plot.styles import current, line_width
 
 if TYPE_CHECKING:
     import xarray
@@ -36,11 +43,6 @@ def as_chart(value: Any) -> Any:
 def axes_of(chart: Any) -> tuple[str, ...]:
     """Names of the axes of the grid."""
     return tuple(map(str, chart.status.dims))
-
-
-def label_of(chart: xarray.Dataset, name: str) -> str:
-    """Name of an axis, with its unit if that is known."""
-    return with_unit(name, chart[name].attrs.get("units"))
 
 
 def settled(chart: xarray.Dataset) -> np.ndarray:
@@ -86,13 +88,8 @@ def kinds(chart: xarray.Dataset) -> xarray.DataArray:
     return chart.status.copy(data=np.where(known, found, 0)).assign_attrs(flags).rename("kind")
 
 
-def plot_map(
-    chart: xarray.Dataset,
-    exponent: int = 0,
-    *,
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
-) -> Axes:
+@picture
+def plot_map(chart: xarray.Dataset, exponent: int = 0, **look: Unpack[Look]) -> Axes:
     """Map of an exponent over two axes: red if positive, blue if negative.
 
     Rows that failed are grey, and exponents of minus infinity dark blue; a legend says so.
@@ -105,10 +102,6 @@ def plot_map(
         From :func:`lyapunov.chart`, over two axes; ``.sel`` takes a plane of three axes.
     exponent
         Index of the exponent, 0 for the largest.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Raises
     ------
@@ -128,7 +121,7 @@ def plot_map(
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    check_axes(ax, figsize)
+    check_look(look)
     exponent = arguments.count("exponent", exponent, 0, as_chart(chart).sizes["exponent"] - 1)
     two_axes(chart)
     values = settled(chart)[..., exponent]
@@ -137,10 +130,10 @@ def plot_map(
     values = np.where(failed | lost, np.nan, values)
     sizes = np.abs(values[np.isfinite(values) & (values != 0.0)])
     limit = float(np.quantile(sizes, SHOWN)) if sizes.size else 1.0
-    (ax,) = axes_for(ax, 1, FIGURE, figsize)
-    shades = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit}
+    (ax,) = axes_for(look, 1, FIGURE)
+    shades = {"cmap": current().diverging, "vmin": -limit, "vmax": limit}
     picture = _drawn(chart, np.ma.masked_invalid(values), ax, shades)
-    label = with_unit(f"$\\lambda_{{{exponent + 1}}}$", chart.exponents.attrs.get("units"))
+    label = label_of(f"$\\lambda_{{{exponent + 1}}}$", chart.exponents.attrs.get("units"))
     ax.figure.colorbar(picture, ax=ax, extend="both", label=label)
     said = told(chart.status.values, "chart.message")
     marked = [(failed, COLOURS_OF_KINDS[0], said), (lost, LOST, "minus infinity")]
@@ -153,19 +146,14 @@ def plot_map(
     return ax
 
 
-def plot_kinds(
-    chart: xarray.Dataset, *, ax: Axes | None = None, figsize: tuple[float, float] | None = None
-) -> Axes:
+@picture
+def plot_kinds(chart: xarray.Dataset, **look: Unpack[Look]) -> Axes:
     """Map of the kinds of motion over two axes: periodic, torus, chaotic (see :func:`kinds`).
 
     Parameters
     ----------
     chart
         From :func:`lyapunov.chart`, over two axes; ``.sel`` takes a plane of three axes.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Raises
     ------
@@ -185,17 +173,17 @@ def plot_kinds(
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    check_axes(ax, figsize)
+    check_look(look)
     two_axes(as_chart(chart))
     found = kinds(chart).values
-    (ax,) = axes_for(ax, 1, FIGURE, figsize)
+    (ax,) = axes_for(look, 1, FIGURE)
     shades = {"cmap": ListedColormap(COLOURS_OF_KINDS), "vmin": -0.5, "vmax": len(KINDS) - 0.5}
     _drawn(chart, found, ax, shades)
     patches = [
-        Patch(facecolor=COLOURS_OF_KINDS[i], edgecolor="0.4", linewidth=0.5, label=KINDS[i])
+        Patch(facecolor=COLOURS_OF_KINDS[i], edgecolor="0.4", linewidth=line_width(0.5), label=KINDS[i])
         for i in np.unique(found)
     ]
-    ax.legend(handles=patches, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(patches))
+    small_legend(ax, patches)
     return ax
 
 
@@ -211,8 +199,8 @@ def _drawn(chart: xarray.Dataset, values: Any, ax: Axes, shades: dict[str, Any])
         picture: Any = ax.imshow(values, extent=extent, **options, **shades)
     else:
         picture = ax.pcolormesh(x, y, values, shading="nearest", rasterized=True, **shades)
-    ax.set_xlabel(label_of(chart, across))
-    ax.set_ylabel(label_of(chart, down))
+    ax.set_xlabel(label_of(across, chart[across].attrs.get("units")))
+    ax.set_ylabel(label_of(down, chart[down].attrs.get("units")))
     return picture
 
 

@@ -2,31 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridArc, HybridSystem, Section, StatusCode, arguments
-from hybrid.display.tables import with_unit
 from hybrid.plot import DATASETS, drawn
+from hybrid.plot.axes import (
+    Rows,
+    axes_for,
+    diameter,
+    dot_area,
+    mark,
+    named_quantity,
+    told,
+)
 from hybrid.plot.datasets import SECTION, column, column_label, column_name
-from hybrid.plot.style import Rows, axes_for, dot_area, mark, named_quantity, small_legend, told
-from hybrid.simulation.labelled import Names
+from hybrid.plot.labels import label_of
+from hybrid.plot.legends import small_legend
+from hybrid.plot.picture import Look, picture
+from hybrid.plot.styles import INK, colour_of, line_width, style
 from lyapunov.compare import ModelComparison
 from lyapunov.convergence import (
-    COLOURS,
     FIGURE,
-    INK,
     MINUS_INFINITY,
     numbers,
     plot_convergence,
     plot_spectrum,
     plot_two_orbits,
 )
-from lyapunov.maps import as_chart, axes_of, kinds, label_of, plot_kinds, plot_map, two_axes
+from lyapunov.maps import as_chart, axes_of, kinds, plot_kinds, plot_map, two_axes
 from lyapunov.spectrum import LyapunovSpectrum
 from lyapunov.two_orbit import TwoOrbitExponents
 
@@ -36,27 +43,6 @@ if TYPE_CHECKING:
 
 # Points of a section that spread less than this share of the orbit are drawn as one fixed point.
 SAME_POINT = 1e-6
-STYLE: Any = {
-    "figure.constrained_layout.use": True,
-    "savefig.dpi": 160,
-    "font.size": 9,
-    "axes.titlesize": 9.5,
-    "axes.titlelocation": "left",
-    "axes.edgecolor": INK,
-    "axes.labelcolor": INK,
-    "axes.linewidth": 0.7,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "xtick.color": INK,
-    "ytick.color": INK,
-    "grid.color": "#E4E4E4",
-    "grid.linewidth": 0.6,
-    "legend.edgecolor": "none",
-    "legend.framealpha": 0.85,
-    "legend.fontsize": 8,
-    "lines.linewidth": 1.3,
-}
-
 __all__ = [
     "kinds",
     "plot_bifurcation",
@@ -78,32 +64,15 @@ WHERE = "chart.message"
 POINTS_OF_A_PORTRAIT = 40_000
 
 
-def style() -> AbstractContextManager[None]:
-    """Matplotlib settings for these charts: ``with style(): ...``.
-
-    Examples
-    --------
-    >>> import hybrid, models
-    >>> from lyapunov.plot import plot_phase_portrait, style
-    >>> arc = hybrid.simulate(models.impact_oscillator(), (0.0, 0.0), (0.0, 50.0))
-    >>> with style():
-    ...     ax = plot_phase_portrait(arc, "x", "v")
-    """
-    import matplotlib
-
-    return matplotlib.rc_context(STYLE)
-
-
+@picture
 def plot_phase_portrait(
     arc: HybridArc,
     x: str,
     y: str,
     *,
     section: Section | ArrayLike | None = None,
-    labels: tuple[str, str] | None = None,
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
     size: float | None = None,
+    **look: Unpack[Look],
 ) -> Axes:
     """Orbit in the plane of two components or outputs, with jumps as straight lines and points of a section.
 
@@ -115,12 +84,6 @@ def plot_phase_portrait(
         Names or indices of the state's components, or names of outputs.
     section
         What to mark: a section of the model, or points ``(N, n)``, of which no outputs are known.
-    labels
-        Labels of the axes; by default the names, with their units.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
     size
         Diameter of the dots of the section in points.
 
@@ -129,36 +92,25 @@ def plot_phase_portrait(
     >>> import hybrid, models
     >>> from lyapunov.plot import plot_phase_portrait
     >>> arc = hybrid.simulate(models.impact_oscillator(), (0.0, 0.0), (0.0, 50.0))
-    >>> plot_phase_portrait(arc, "x", "v", labels=("position", "speed")).get_xlabel()
+    >>> plot_phase_portrait(arc, "x", "v", labels={"x": "position"}).get_xlabel()
     'position'
     """
     system = arguments.instance("arc", arc, HybridArc, "Make one with hybrid.simulate.").system
     shown = named_quantity("x", system, x), named_quantity("y", system, y)
     marks = None if section is None else _marks(section, system, shown)
-    names = Names(system.state_names, system.units)
-    across, up = axis_labels(labels, *(names.label(name) for name in shown))
-    large, small = (26.0, 2.0) if size is None else (dot_area(1, size),) * 2
-    (ax,) = axes_for(ax, 1, FIGURE, figsize)
+    large, small = (26.0, 2.0) if size is None else (diameter(size) ** 2,) * 2
+    (ax,) = axes_for(look, 1, FIGURE)
     orbit = [_dense(arc, name) for name in shown]
-    ax.plot(*orbit, color=COLOURS[5], linewidth=0.5, alpha=0.8, rasterized=True)
+    ax.plot(*orbit, color=colour_of(5), linewidth=line_width(0.5), alpha=0.8, rasterized=True)
     if marks is not None:
         # A large dot makes a fixed point visible; small dots keep a cloud of points readable.
         apart = any(_spread(m) > SAME_POINT * _spread(o) for m, o in zip(marks, orbit, strict=True))
         area = small if apart else large
-        ax.scatter(marks[0], marks[1], s=area, color=COLOURS[1], linewidths=0, zorder=3, rasterized=True)
+        ax.scatter(marks[0], marks[1], s=area, color=colour_of(1), linewidths=0, zorder=3, rasterized=True)
+    across, up = (label_of(name, system.units.get(name)) for name in shown)
     ax.set_xlabel(across)
     ax.set_ylabel(up)
     return ax
-
-
-def axis_labels(labels: object, *names: str) -> tuple[str, str]:
-    """Labels of the two axes."""
-    if labels is None:
-        return names[0], names[1]
-    texts = arguments.items("labels", labels, "be a pair of texts")
-    if len(texts) != 2 or not all(isinstance(text, str) for text in texts):
-        raise arguments.refusal("labels", "be a pair of texts", labels)
-    return texts[0], texts[1]
 
 
 def _marks(section: object, system: HybridSystem, names: Sequence[str]) -> list[np.ndarray]:
@@ -191,23 +143,14 @@ def _dense(arc: HybridArc, name: str) -> np.ndarray:
     return np.concatenate([arc[name], arc(times, name)])[order]
 
 
-def plot_exponents(
-    chart: xarray.Dataset,
-    *,
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
-    size: float | None = None,
-) -> Axes:
+@picture
+def plot_exponents(chart: xarray.Dataset, *, size: float | None = None, **look: Unpack[Look]) -> Axes:
     """Exponents of a chart over one axis, with bands of two standard errors and a line at zero.
 
     Parameters
     ----------
     chart
         From :func:`lyapunov.chart`, over one axis; ``.sel`` takes a line of a grid.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
     size
         Size in points of the marks of failed rows; those of minus infinity have half of it.
 
@@ -223,34 +166,32 @@ def plot_exponents(
     name, values = _only_axis(as_chart(chart))
     exponents, errors = chart.exponents.values, chart.standard_error.values
     length = MARK if size is None else arguments.positive("size", size, "be a positive size in points")
-    (ax,) = axes_for(ax, 1, FIGURE, figsize)
-    ax.axhline(0.0, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
+    (ax,) = axes_for(look, 1, FIGURE)
+    ax.axhline(0.0, color=INK, linewidth=line_width(0.8), linestyle=(0, (4, 3)), zorder=1)
     order = np.argsort(values)
     for i in range(exponents.shape[-1]):
         middle, error = exponents[order, i], 2 * errors[order, i]
         middle = np.where(np.isfinite(middle), middle, np.nan)
-        colour = COLOURS[i % len(COLOURS)]
-        ax.plot(values[order], middle, color=colour, linewidth=0.9, label=f"$\\lambda_{{{i + 1}}}$")
+        colour = colour_of(i)
+        ax.plot(
+            values[order], middle, color=colour, linewidth=line_width(0.9), label=f"$\\lambda_{{{i + 1}}}$"
+        )
         ax.fill_between(values[order], middle - error, middle + error, color=colour, alpha=0.25, linewidth=0)
         lost = values[order][np.isneginf(exponents[order, i])]
         if len(lost):
             mark(ax, lost, "v", colour, f"$\\lambda_{{{i + 1}}}$: {MINUS_INFINITY}", size=length / 2)
     failed = _mark_failures(ax, chart, values, length)
-    ax.set_xlabel(label_of(chart, name))
-    ax.set_ylabel(with_unit("Lyapunov exponents", chart.exponents.attrs.get("units")))
+    ax.set_xlabel(label_of(name, chart[name].attrs.get("units")))
+    ax.set_ylabel(label_of("Lyapunov exponents", chart.exponents.attrs.get("units")))
     ax.grid(True, axis="y")
     if exponents.shape[-1] > 1 or failed or np.isneginf(exponents).any():
         small_legend(ax)
     return ax
 
 
+@picture
 def plot_bifurcation(
-    chart: xarray.Dataset,
-    component: str | None = None,
-    *,
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
-    size: float | None = None,
+    chart: xarray.Dataset, component: str | None = None, *, size: float | None = None, **look: Unpack[Look]
 ) -> Axes:
     """Bifurcation diagram: points of the section over the parameter.
 
@@ -260,12 +201,6 @@ def plot_bifurcation(
         From :func:`lyapunov.chart`, over one axis and with ``section=``.
     component
         Name of the component to show, or of an output that the chart has; by default the first component.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
-    size
-        Diameter of the dots in points; by default smaller for more dots.
 
     Raises
     ------
@@ -290,23 +225,19 @@ def plot_bifurcation(
         raise ArgumentError("chart must have section points; this one has none. Compute it with section=100.")
     shown, up = column("component", chart, 0 if component is None else component, SECTION)
     across, up = np.repeat(values, points), up.ravel()
-    area = dot_area(len(up), size)
-    (ax,) = axes_for(ax, 1, FIGURE, figsize)
-    ax.scatter(across, up, s=area, color=COLOURS[0], linewidths=0, rasterized=True)
-    ax.set_xlabel(label_of(chart, name))
+    area = dot_area(across, up, size)
+    (ax,) = axes_for(look, 1, FIGURE)
+    ax.scatter(across, up, s=area, color=colour_of(0), linewidths=0, rasterized=True)
+    ax.set_xlabel(label_of(name, chart[name].attrs.get("units")))
     if _mark_failures(ax, chart, values):
         small_legend(ax)
     ax.set_ylabel(column_label(chart, shown))
     return ax
 
 
+@picture
 def plot_chart(
-    chart: xarray.Dataset,
-    component: str | None = None,
-    *,
-    ax: Axes | Iterable[Axes] | None = None,
-    figsize: tuple[float, float] | None = None,
-    size: float | None = None,
+    chart: xarray.Dataset, component: str | None = None, *, size: float | None = None, **look: Unpack[Look]
 ) -> Rows:
     """Draw a chart: exponents below a bifurcation diagram, or a map of the largest exponent.
 
@@ -321,8 +252,6 @@ def plot_chart(
     ax
         Axes to draw into, two if the chart has a section and one axis, else one; by default those of a new
         figure.
-    figsize
-        Width and height of a new figure in inches.
     size
         Diameter of the dots of the diagram in points; by default smaller for more dots.
 
@@ -347,20 +276,20 @@ def plot_chart(
     'w'
     """
     if size is not None:
-        dot_area(1, size)
+        diameter(size)
     if component is not None:
         column_name("component", as_chart(chart), component, SECTION[1])
     if len(axes_of(as_chart(chart))) > 1:
         two_axes(chart)
-        axes = axes_for(ax, 1, (5.6, 4.4), figsize)
+        axes = axes_for(look, 1, (5.6, 4.4))
         plot_map(chart, ax=axes[0])
     elif not chart.sizes.get("sample", 0):
         _only_axis(chart)
-        axes = axes_for(ax, 1, (7.2, 3.2), figsize)
+        axes = axes_for(look, 1, (7.2, 3.2))
         plot_exponents(chart, ax=axes[0])
     else:
         _only_axis(chart)
-        axes = axes_for(ax, 2, (7.2, 5.4), figsize)
+        axes = axes_for(look, 2, (7.2, 5.4))
         plot_bifurcation(chart, component, ax=axes[0], size=size).set_xlabel("")
         plot_exponents(chart, ax=axes[1])
     return axes
@@ -392,19 +321,14 @@ def _mark_failures(ax: Axes, chart: xarray.Dataset, values: np.ndarray, length: 
     return len(bad) > 0
 
 
-def plot_comparison(
-    result: ModelComparison, *, ax: Axes | None = None, figsize: tuple[float, float] | None = None
-) -> Axes:
+@picture
+def plot_comparison(result: ModelComparison, **look: Unpack[Look]) -> Axes:
     """Models by cost and by the largest distance of their exponents from the reference.
 
     Parameters
     ----------
     result
         From :func:`lyapunov.compare_models`.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Examples
     --------
@@ -420,15 +344,21 @@ def plot_comparison(
     'log'
     """
     arguments.instance("result", result, ModelComparison, "Make one with lyapunov.compare_models.")
-    (ax,) = axes_for(ax, 1, FIGURE, figsize)
+    (ax,) = axes_for(look, 1, FIGURE)
     unit = ""
     for i, name in enumerate(result.names):
-        colour, cost = COLOURS[i % len(COLOURS)], result.cost(name)
+        colour, cost = colour_of(i), result.cost(name)
         unit = result.spectra[name][0].names.rate.get("units", "")
         distance = result.distance(name)
         good = distance[np.isfinite(distance) & (distance > 0)]
         if name == result.reference:
-            ax.axvline(cost, color=INK, linewidth=0.8, linestyle=(0, (4, 3)), label=f"{name}, the reference")
+            ax.axvline(
+                cost,
+                color=INK,
+                linewidth=line_width(0.8),
+                linestyle=(0, (4, 3)),
+                label=f"{name}, the reference",
+            )
         elif len(good):
             ax.plot(cost, good.max(), "o", color=colour, label=name)
         else:
@@ -436,9 +366,9 @@ def plot_comparison(
             mark(ax, [cost], "v", colour, f"{name}: {told}")
     ax.set_yscale("log")
     ax.set_xlabel("steps per interval")
-    ax.set_ylabel(with_unit("largest distance of exponents", unit))
+    ax.set_ylabel(label_of("largest distance of exponents", unit))
     ax.grid(True, axis="y")
-    ax.legend()
+    small_legend(ax)
     return ax
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import attrs
 import numpy as np
@@ -23,7 +23,7 @@ from hybrid.status import Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    from hybrid.plot.picture import Look
 
 TIGHTER = (10.0, 100.0)
 EPSILON = float(np.finfo(float).eps)
@@ -63,13 +63,11 @@ class GlobalError:
     jumps: np.ndarray
     status: Status
 
-    def plot(
-        self, *, ax: Axes | list[Axes] | None = None, figsize: tuple[float, float] | None = None
-    ) -> np.ndarray:
+    def plot(self, **options: Unpack[Look]) -> np.ndarray:
         """Draw the bounds, see :func:`hybrid.plot.plot_global_error`."""
         from hybrid.plot import plot_global_error
 
-        return plot_global_error(self, ax=ax, figsize=figsize)
+        return plot_global_error(self, **options)
 
     def __repr__(self) -> str:
         times = f", {self.jumps.max():.1e} in time of jumps" if len(self.jumps) else ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import attrs
 import numpy as np
@@ -23,6 +23,8 @@ from hybrid.system.graph import HybridSystem, as_system, check_mode
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from hybrid.plot.picture import Look
 
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 METHODS: Mapping[str, Solver] = {"Taylor": Taylor(), "DOP853": DOP853(), "Tsit5": Tsit5()}
@@ -136,14 +138,12 @@ class WorkPrecision:
     def plot(
         self,
         quantity: str = "state",
-        *,
-        ax: Axes | None = None,
-        figsize: tuple[float, float] | None = None,
+        **options: Unpack[Look],
     ) -> Axes:
         """Draw error over time, see :func:`hybrid.plot.plot_work_precision`."""
         from hybrid.plot import plot_work_precision
 
-        return plot_work_precision(self, quantity, ax=ax, figsize=figsize)
+        return plot_work_precision(self, quantity, **options)
 
     def error_of(self, quantity: str) -> np.ndarray:
         """Column ``(rows,)`` of the errors of a quantity.

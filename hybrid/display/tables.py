@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from html import escape
 
+# What authors write for the unit of numbers such as ratios.
+NO_UNIT = ("", "1", "-", "[-]", "–", "—")
+
 
 def table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: bool = False) -> str:
     """Columns of text; with ``numbers`` all columns but the first are right-aligned."""
@@ -29,8 +32,13 @@ def html_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def with_unit(name: str, unit: str | None) -> str:
-    """A name with its unit, if there is one: ``q (m)``."""
-    return f"{name} ({unit})" if unit else name
+    """A name with its unit, if there is one: ``q (m)``. Numbers have none."""
+    return f"{name} ({unit})" if unit and unit not in NO_UNIT else name
+
+
+def measured(number: str, unit: str | None) -> str:
+    """A number with its unit, if there is one: ``2.5 m``."""
+    return f"{number} {unit}" if unit and unit not in NO_UNIT else number
 
 
 def counted(number: int, noun: str) -> str:

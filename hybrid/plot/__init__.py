@@ -25,7 +25,7 @@ from hybrid.plot.datasets import plot_ends, plot_sweep
 from hybrid.plot.graph import plot_graph
 from hybrid.plot.jumps import plot_global_error, plot_jumps
 from hybrid.plot.orbits import plot_orbit, plot_section
-from hybrid.plot.style import COLOURS
+from hybrid.plot.styles import COLOURS, style
 from hybrid.plot.work_precision import plot_work_precision
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.jumps import Jumps
@@ -52,6 +52,7 @@ __all__ = [
     "plot_section",
     "plot_sweep",
     "plot_work_precision",
+    "style",
 ]
 
 

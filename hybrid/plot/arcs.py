@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
 from hybrid import arguments
-from hybrid.plot.contacts import contact_names, draw_contacts
-from hybrid.plot.style import (
+from hybrid.plot.axes import (
     Rows,
     axes_for,
-    colour_of,
-    legend,
     member_colours,
-    member_legend,
     named_quantity,
     plain,
 )
+from hybrid.plot.contacts import contact_names, draw_contacts
+from hybrid.plot.labels import label_of
+from hybrid.plot.legends import legend, member_legend
+from hybrid.plot.picture import Look, picture
+from hybrid.plot.styles import colour_of, dot_size, line_width
 from hybrid.simulation.arc import HybridArc
-from hybrid.simulation.labelled import Names
 from hybrid.simulation.quantities import members, table_of
 from hybrid.system.graph import HybridSystem
 from hybrid.system.members import condensed
@@ -34,13 +34,8 @@ JUMP_COLOUR = "0.35"
 FIRST_PARTS, MOST_HALVINGS, SMOOTH = 4, 8, 1e-3
 
 
-def plot_arc(
-    arc: HybridArc,
-    components: Iterable[str | int] | None = None,
-    *,
-    ax: Axes | Iterable[Axes] | None = None,
-    figsize: tuple[float, float] | None = None,
-) -> Rows:
+@picture
+def plot_arc(arc: HybridArc, components: Iterable[str | int] | None = None, **look: Unpack[Look]) -> Rows:
     """Draw an arc over time: one row per component or output, one colour per mode, dotted lines for resets.
 
     The members of a repeat share a row, with one colour per member. Below all components of a system with
@@ -55,8 +50,6 @@ def plot_arc(
         such as ``cell.soc`` draws those of all members.
     ax
         Axes to draw into, one per row; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Returns
     -------
@@ -80,8 +73,7 @@ def plot_arc(
     system = _as_arc(arc).system
     chosen = list(condensed(system.own_names)) if components is None else _names(system, components)
     touches = components is None and bool(contact_names(system))
-    axes = axes_for(ax, len(chosen) + touches, figsize=figsize)
-    labels = Names(system.state_names, system.units)
+    axes = axes_for(look, len(chosen) + touches)
     drawn = [members(name, system) or (name,) for name in chosen]
     columns = [name for names in drawn for name in names]
     lines = curves(arc, columns)
@@ -91,32 +83,26 @@ def plot_arc(
             for mode, (t, values) in lines.items():
                 colour = colour_of(mode) if one == name else shades[k]
                 found = values[:, columns.index(one)]
-                row.plot(t, found, color=colour, linewidth=1.4, solid_capstyle="round")
+                row.plot(t, found, color=colour, linewidth=line_width(1.4), solid_capstyle="round")
             if arc.keeps_jumps:
                 t, ends = np.repeat(arc.jumps.t, 3), _over_jumps(arc, one)
-                row.plot(t, ends, color=JUMP_COLOUR, linewidth=0.9, linestyle=":", zorder=1)
+                row.plot(t, ends, color=JUMP_COLOUR, linewidth=line_width(0.9), linestyle=":", zorder=1)
         if name not in names:
             member_legend(row, names, shades)
         _shade(row, lines)
-        row.set_ylabel(labels.label(names[0]).replace(names[0], name))
+        row.set_ylabel(label_of(name, system.units.get(names[0])))
         row.margins(x=0)
         plain(row)
     if touches:
         draw_contacts(arc, axes[-1])
     if len(axes):
-        axes[-1].set_xlabel(labels.label("t"))
+        axes[-1].set_xlabel(label_of("t", system.units.get("t")))
         legend(axes[0], system.mode_names, lines)
     return axes
 
 
-def plot_phase(
-    arc: HybridArc,
-    x: str | int,
-    y: str | int,
-    *,
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
-) -> Axes:
+@picture
+def plot_phase(arc: HybridArc, x: str | int, y: str | int, **look: Unpack[Look]) -> Axes:
     """Draw an arc in the plane of two components or outputs: one colour per mode, jumps dashed.
 
     A dot marks the start.
@@ -127,10 +113,6 @@ def plot_phase(
         From :func:`hybrid.simulate`; its dense output, if it has one, refines the curves between the steps.
     x, y
         Names or indices of the state's components, or names of outputs.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Returns
     -------
@@ -152,18 +134,17 @@ def plot_phase(
     """
     system = _as_arc(arc).system
     across, up = (named_quantity("x", system, x), named_quantity("y", system, y))
-    (ax,) = axes_for(ax, 1, (5.0, 4.2), figsize)
-    labels = Names(system.state_names, system.units)
+    (ax,) = axes_for(look, 1, (5.0, 4.2))
     lines = curves(arc, (across, up))
     for mode, (_, values) in lines.items():
-        ax.plot(*values.T, color=colour_of(mode), linewidth=1.4, solid_capstyle="round")
+        ax.plot(*values.T, color=colour_of(mode), linewidth=line_width(1.4), solid_capstyle="round")
     if arc.keeps_jumps:
         ends = _over_jumps(arc, across), _over_jumps(arc, up)
-        ax.plot(*ends, color=JUMP_COLOUR, linewidth=0.9, linestyle=(0, (4, 3)), zorder=1)
+        ax.plot(*ends, color=JUMP_COLOUR, linewidth=line_width(0.9), linestyle=(0, (4, 3)), zorder=1)
     if len(arc.x):
-        ax.plot(arc[across][0], arc[up][0], "o", color="black", markersize=4)
-    ax.set_xlabel(labels.label(across))
-    ax.set_ylabel(labels.label(up))
+        ax.plot(arc[across][0], arc[up][0], "o", color="black", markersize=dot_size(4))
+    ax.set_xlabel(label_of(across, system.units.get(across)))
+    ax.set_ylabel(label_of(up, system.units.get(up)))
     plain(ax)
     legend(ax, system.mode_names, lines)
     return ax

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
 from hybrid import arguments
 from hybrid.display.ranges import described
-from hybrid.display.tables import counted, with_unit
+from hybrid.display.tables import counted
 from hybrid.errors import ArgumentError
-from hybrid.plot.style import COLOURS, axes_for, dot_area
+from hybrid.plot.axes import (
+    axes_for,
+    dot_area,
+)
+from hybrid.plot.labels import label_of
+from hybrid.plot.legends import small_legend
+from hybrid.plot.picture import Look, picture
+from hybrid.plot.styles import colour_of, line_width
 
 if TYPE_CHECKING:
     import xarray
@@ -21,13 +28,8 @@ if TYPE_CHECKING:
 NONE_COLOUR, VIOLATES_COLOUR = "#BFBFBF", "#FFFFFF"
 
 
-def plot_basins(
-    basins: xarray.Dataset,
-    *,
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
-    size: float | None = None,
-) -> Axes:
+@picture
+def plot_basins(basins: xarray.Dataset, *, size: float | None = None, **look: Unpack[Look]) -> Axes:
     """Draw which attractor each start leads to: one colour per attractor, over one or two components.
 
     Starts that lead to none are grey, those that violate every mode are hatched. The points of the
@@ -37,10 +39,6 @@ def plot_basins(
     ----------
     basins
         From :func:`hybrid.basins`, over one or two axes; ``.isel`` takes a plane of more.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
     size
         Diameter of the attractors' points in points; by default smaller for more points.
 
@@ -76,8 +74,9 @@ def plot_basins(
             + (f"Take a plane: basins.isel({taken})." if taken else "Print them.")
         )
     count = basins.sizes["attractor"]
-    area = dot_area(int(np.isfinite(basins.points.values[..., 0]).sum()), size)
-    (ax,) = axes_for(ax, 1, (6.4, 4.6) if len(dims) == 2 else (6.4, 1.8), figsize)
+    points = basins.points.values.reshape(-1, basins.sizes["state"])
+    area = dot_area(points[:, 0], points[:, -1], size)
+    (ax,) = axes_for(look, 1, (6.4, 4.6) if len(dims) == 2 else (6.4, 1.8))
     colours = [VIOLATES_COLOUR, NONE_COLOUR, *(_colour(i) for i in range(count))]
     across, up = dims[0], dims[1] if len(dims) == 2 else None
     x = basins[across].values
@@ -94,24 +93,30 @@ def plot_basins(
         outside = np.where(values == -1, 1.0, 0.0)
         ax.contourf(x, y, outside, levels=[0.5, 1.5], colors="none", hatches=["////"])
     _draw_points(ax, basins, dims, area)
-    ax.set_xlabel(with_unit(across, basins[across].attrs.get("units")))
+    ax.set_xlabel(label_of(across, basins[across].attrs.get("units")))
     if up:
-        ax.set_ylabel(with_unit(up, basins[up].attrs.get("units")))
+        ax.set_ylabel(label_of(up, basins[up].attrs.get("units")))
     else:
         ax.set_yticks([])
     violated = json.loads(basins.attrs.get("violated_modes", "[]"))
     names = [f"violates {' and '.join(violated)}", "no attractor", *_described(basins)]
     present = [i for i in range(count + 2) if (values == i - 1).any()]
     handles = [
-        Patch(facecolor=colours[i], edgecolor="0.4", linewidth=0.5, label=names[i], hatch="////" * (i == 0))
+        Patch(
+            facecolor=colours[i],
+            edgecolor="0.4",
+            linewidth=line_width(0.5),
+            label=names[i],
+            hatch="////" * (i == 0),
+        )
         for i in present
     ]
-    ax.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1), frameon=False, fontsize=8)
+    small_legend(ax, handles, side="left", most=1)
     return ax
 
 
 def _colour(attractor: int) -> str:
-    return COLOURS[attractor % len(COLOURS)]
+    return colour_of(attractor)
 
 
 def _described(basins: xarray.Dataset) -> list[str]:
@@ -173,19 +178,14 @@ def _draw_points(ax: Axes, basins: xarray.Dataset, dims: tuple[str, ...], area: 
     ax.set_ylim(limits[1])
 
 
-def plot_fractions(
-    fractions: xarray.Dataset, *, ax: Axes | None = None, figsize: tuple[float, float] | None = None
-) -> Axes:
+@picture
+def plot_fractions(fractions: xarray.Dataset, **look: Unpack[Look]) -> Axes:
     """Draw the shares of starts that lead to each attractor: bands over a parameter, or bars without one.
 
     Parameters
     ----------
     fractions
         From :func:`hybrid.basin_fractions`.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Returns
     -------
@@ -202,7 +202,7 @@ def plot_fractions(
     """
     if not {"fraction", "standard_error"} <= set(getattr(fractions, "data_vars", ())):
         raise arguments.refusal("fractions", "be a dataset made with hybrid.basin_fractions", fractions)
-    (ax,) = axes_for(ax, 1, (6.4, 3.6), figsize)
+    (ax,) = axes_for(look, 1, (6.4, 3.6))
     labels = fractions.label.values.tolist()
     colours = {-1: VIOLATES_COLOUR, 0: NONE_COLOUR}
     shown = [label for label in [*(each for each in labels if each > 0), 0, -1] if label in labels]
@@ -223,11 +223,11 @@ def plot_fractions(
             error = float(fractions.standard_error.sel(label=label))
             ax.bar(str(label), float(share), yerr=error, label=name, capsize=3, **edge)
     if along:
-        ax.set_xlabel(with_unit(along[0], fractions[along[0]].attrs.get("units")))
+        ax.set_xlabel(label_of(along[0], fractions[along[0]].attrs.get("units")))
         ax.set_xlim(fractions[along[0]].values.min(), fractions[along[0]].values.max())
         ax.set_ylim(0.0, 1.0)
     ax.set_ylabel("share of the starts")
-    ax.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2, frameon=False, fontsize=8)
+    small_legend(ax, side="left", most=2)
     return ax
 
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
 from hybrid import arguments
-from hybrid.display.tables import with_unit
 from hybrid.errors import ArgumentError
 from hybrid.orbits.continuation.branch import Branch
 from hybrid.orbits.continuation.continue_bifurcation import BifurcationCurve
@@ -18,9 +17,16 @@ from hybrid.orbits.diagrams.diagram import Diagram
 from hybrid.orbits.equilibria.branch import EquilibriumBranch
 from hybrid.orbits.equilibria.curves import EquilibriumCurve
 from hybrid.orbits.labelled import table_at
+from hybrid.plot.axes import (
+    axes_for,
+    dot_area,
+    named_quantity,
+)
 from hybrid.plot.datasets import SECTION, column
-from hybrid.plot.style import COLOURS, axes_for, dot_area, named_quantity, small_legend
-from hybrid.simulation.labelled import Names
+from hybrid.plot.labels import label_of
+from hybrid.plot.legends import small_legend
+from hybrid.plot.picture import Look, picture
+from hybrid.plot.styles import colour_of, dot_size, line_width
 from hybrid.simulation.quantities import mode_indices, table_of
 
 if TYPE_CHECKING:
@@ -58,14 +64,14 @@ NEUTRAL = "0.2"
 OF_BRANCH = "branch"
 
 
+@picture
 def plot_branch(
     branch: AnyBranch | Sequence[AnyBranch],
     y: str | int = 0,
     *,
     over: xarray.Dataset | Axes | None = None,
     label: str | Sequence[str] | None = None,
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
+    **look: Unpack[Look],
 ) -> Axes:
     """Draw what a branch is asked for by name over its parameter, with the bifurcations.
 
@@ -86,10 +92,6 @@ def plot_branch(
         ``lyapunov.chart(section=...)``; or the axes of a picture of one.
     label
         What the legend says of the branch, or of each.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Returns
     -------
@@ -119,18 +121,17 @@ def plot_branch(
     if over is not None:
         if hasattr(over, "data_vars"):
             cloud = _points_of(over, branches[0].name, names[0])
-        elif ax is None and hasattr(over, "plot"):
-            ax = over
+        elif look.get("ax") is None and hasattr(over, "plot"):
+            look["ax"] = over
         else:
             wanted = "be a sweep or a chart with points of its section, or axes in place of ax"
             raise arguments.refusal("over", wanted, over)
-    (ax,) = axes_for(ax, 1, (6.4, 4.2), figsize)
+    (ax,) = axes_for(look, 1, (6.4, 4.2))
     if cloud is not None:
         _draw_points(ax, *cloud)
     for each, name, text in zip(branches, names, labels, strict=True):
         _draw_branch(ax, each, name, text)
-    known = Names(branches[0].system.state_names, branches[0].system.units)
-    ax.set_xlabel(known.label(branches[0].name))
+    ax.set_xlabel(label_of(branches[0].name, branches[0].system.units.get(branches[0].name)))
     ax.set_ylabel(_label_of(branches[0], names[0]))
     _legend(ax)
     return ax
@@ -139,8 +140,8 @@ def plot_branch(
 def _label_of(branch: AnyBranch, name: str) -> str:
     """The name of what is drawn, with its unit."""
     if isinstance(branch, Branch) and name in branch.outputs:
-        return with_unit(name, branch.output_units.get(name))
-    return Names(branch.system.state_names, branch.system.units).label(name)
+        return label_of(name, branch.output_units.get(name))
+    return label_of(name, branch.system.units.get(name))
 
 
 def _branches_of(given: object) -> list[AnyBranch]:
@@ -182,9 +183,9 @@ def _quantity_of(branch: AnyBranch, y: object) -> str:
 
 def _draw_branch(ax: Axes, branch: AnyBranch, name: str, label: str | None) -> None:
     """Lines of a branch in the next colour, its bifurcations, and what a legend needs."""
-    colour = COLOURS[sum(each.get_gid() == OF_BRANCH for each in ax.lines) % len(COLOURS)]
+    colour = colour_of(sum(each.get_gid() == OF_BRANCH for each in ax.lines))
     if label is not None:
-        ax.plot([], [], "-", color=colour, lw=LINE, label=label)
+        ax.plot([], [], "-", color=colour, lw=line_width(LINE), label=label)
     across, values, stable, admissible = _with_bifurcations(branch, name)
     first = True
     kinds = [*zip(stable.tolist(), admissible.tolist(), strict=True)]
@@ -194,11 +195,13 @@ def _draw_branch(ax: Axes, branch: AnyBranch, name: str, label: str | None) -> N
         shown = [*inside, *([inside[-1] + 1] if inside[-1] + 1 < len(stable) else [])]
         text, style = [*LINES.items()][0 if is_stable else 1]
         opacity = 1.0 if is_admissible else VIRTUAL
-        (line,) = ax.plot(across[shown], values[shown], style, color=colour, lw=LINE, alpha=opacity)
+        (line,) = ax.plot(
+            across[shown], values[shown], style, color=colour, lw=line_width(LINE), alpha=opacity
+        )
         line.set_gid(OF_BRANCH if first else None)
         first = False
         if text not in _texts(ax):
-            ax.plot([], [], style, color=NEUTRAL, lw=LINE, label=text)
+            ax.plot([], [], style, color=NEUTRAL, lw=line_width(LINE), label=text)
     found: list[Any] = [*branch.bifurcations]
     there = _there(branch, name)
     _mark(ax, [(each.kind, each.value, up) for each, up in zip(found, there, strict=True)])
@@ -234,13 +237,9 @@ def _with_bifurcations(branch: AnyBranch, name: str) -> tuple[np.ndarray, np.nda
     )
 
 
+@picture
 def plot_diagram(
-    diagram: Diagram,
-    y: str | int = 0,
-    *,
-    over: xarray.Dataset | Axes | None = None,
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
+    diagram: Diagram, y: str | int = 0, *, over: xarray.Dataset | Axes | None = None, **look: Unpack[Look]
 ) -> Axes:
     """Draw all branches of a diagram into one picture, each in a colour of its own; as :func:`plot_branch`.
 
@@ -256,7 +255,7 @@ def plot_diagram(
         Name or index of a component, name of an output, or name of a function in ``outputs=`` of
         :func:`hybrid.continue_all`. Where that is a maximum, a minimum or a mean of ``hybrid.measures``, an
         equilibrium is drawn at the value itself; at other functions only orbits are drawn.
-    over, ax, figsize
+    over
         As for :func:`plot_branch`.
 
     Returns
@@ -284,7 +283,7 @@ def plot_diagram(
                 continue
             name = measure.name
         shown.append((each, name))
-    (ax,) = axes_for(ax, 1, (6.4, 4.2), figsize)
+    (ax,) = axes_for(look, 1, (6.4, 4.2))
     if diagram.sweep is not None:
         _draw_points(ax, "sweep", *_reached(diagram, y))
     for i, (branch, name) in enumerate(shown):
@@ -317,12 +316,8 @@ def _reached(diagram: Diagram, y: str | int) -> tuple[np.ndarray, np.ndarray]:
     return at[good], values[good]
 
 
-def plot_curve(
-    curve: BifurcationCurve | EquilibriumCurve,
-    *,
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
-) -> Axes:
+@picture
+def plot_curve(curve: BifurcationCurve | EquilibriumCurve, **look: Unpack[Look]) -> Axes:
     """Draw a curve of bifurcations in the plane of its two parameters, with its points of codimension two.
 
     Parameters
@@ -331,8 +326,6 @@ def plot_curve(
         From :func:`hybrid.continue_bifurcation`.
     ax
         Axes to draw into, such as those of other curves; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Returns
     -------
@@ -350,13 +343,13 @@ def plot_curve(
     """
     if not isinstance(curve, EquilibriumCurve):
         arguments.instance("curve", curve, BifurcationCurve, "Make one with hybrid.continue_bifurcation.")
-    (ax,) = axes_for(ax, 1, (5.4, 4.2), figsize)
+    (ax,) = axes_for(look, 1, (5.4, 4.2))
     first, second = curve.names
-    ax.plot(curve[first], curve[second], lw=1.4, label=curve.kind)
+    ax.plot(curve[first], curve[second], lw=line_width(1.4), label=curve.kind)
     _mark(ax, [(each.kind, each.values[first], each.values[second]) for each in curve.points])
-    names = Names(curve.system.state_names, curve.system.units)
-    ax.set_xlabel(names.label(first))
-    ax.set_ylabel(names.label(second))
+    units = curve.system.units
+    ax.set_xlabel(label_of(first, units.get(first)))
+    ax.set_ylabel(label_of(second, units.get(second)))
     small_legend(ax)
     return ax
 
@@ -367,7 +360,16 @@ def _mark(ax: Axes, found: list[tuple[str, float, float]]) -> None:
         at = np.array([each[1:] for each in found if each[0] == kind])
         marker = MARKERS.get(kind) or _other_marker(ax, kind)
         label = None if kind in _texts(ax) else kind
-        ax.plot(*at.T, marker, color=NEUTRAL, mfc="white", ms=5.5, mew=1.1, label=label, zorder=3)
+        ax.plot(
+            *at.T,
+            marker,
+            color=NEUTRAL,
+            mfc="white",
+            ms=dot_size(5.5),
+            mew=line_width(1.1),
+            label=label,
+            zorder=3,
+        )
 
 
 def _other_marker(ax: Axes, kind: str) -> str:
@@ -400,7 +402,7 @@ def _texts(ax: Axes) -> list[str]:
 
 def _draw_points(ax: Axes, kind: str, across: np.ndarray, up: np.ndarray) -> None:
     """Dots below the branches, wide enough to be seen beside a line through them."""
-    area = max(dot_area(len(across)), SEEN)
+    area = max(dot_area(across, up), SEEN)
     ax.scatter(across, up, s=area, color="0.55", linewidths=0, rasterized=True, zorder=0, label=kind)
 
 

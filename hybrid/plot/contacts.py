@@ -2,41 +2,42 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
 from hybrid import arguments
 from hybrid.errors import ArgumentError
-from hybrid.plot.style import COLOURS, axes_for, plain, small_legend
+from hybrid.plot.axes import (
+    axes_for,
+    plain,
+)
+from hybrid.plot.labels import label_of
+from hybrid.plot.legends import small_legend
+from hybrid.plot.picture import Look, picture
+from hybrid.plot.styles import colour_of, line_width
 from hybrid.simulation.arc import HybridArc
-from hybrid.simulation.labelled import Names
 from hybrid.system.graph import HybridSystem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# What a band shows, with its colour; where a contact is open the band is a thin line.
-STATES = {"held": COLOURS[0], "sticks": COLOURS[2], "slips +": COLOURS[1], "slips -": COLOURS[4]}
+# What a band shows, with the index of its colour; where a contact is open the band is a thin line.
+STATES = {"held": 0, "sticks": 2, "slips +": 1, "slips -": 4}
 OPEN_COLOUR = "0.6"
 # Heights of a band, as shares of the distance of two contacts.
 HEIGHT, MARK = 0.6, 0.8
 IMPACT_COLOUR = "0.15"
 
 
-def plot_contacts(
-    arc: HybridArc, *, ax: Axes | None = None, figsize: tuple[float, float] | None = None
-) -> Axes:
+@picture
+def plot_contacts(arc: HybridArc, **look: Unpack[Look]) -> Axes:
     """Draw what holds at each contact over time: open, held, sticks, slips; ticks are impacts.
 
     Parameters
     ----------
     arc
         From :func:`hybrid.simulate` of a system made by :func:`hybrid.mechanics`.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Returns
     -------
@@ -66,9 +67,9 @@ def plot_contacts(
     names = contact_names(arc.system)
     if not names:
         raise ArgumentError("plot_contacts: the system of arc has no contacts. Make one with mechanics().")
-    (row,) = axes_for(ax, 1, (7.0, 1.2 + 0.35 * len(names)), figsize)
+    (row,) = axes_for(look, 1, (7.0, 1.2 + 0.35 * len(names)))
     draw_contacts(arc, row)
-    row.set_xlabel(Names(arc.system.state_names, arc.system.units).label("t"))
+    row.set_xlabel(label_of("t", arc.system.units.get("t")))
     return row
 
 
@@ -99,23 +100,25 @@ def draw_contacts(arc: HybridArc, ax: Axes) -> None:
             if state is None:
                 continue
             seen.add(state)
-            ax.broken_barh(
-                [(start, end - start)], (k - 0.5 * HEIGHT, HEIGHT), facecolor=STATES[state], linewidth=0
-            )
+            colour, place = colour_of(STATES[state]), (k - 0.5 * HEIGHT, HEIGHT)
+            ax.broken_barh([(start, end - start)], place, facecolor=colour, linewidth=0)
     if len(arc.t):
-        ax.hlines(range(len(names)), arc.t[0], arc.t[-1], color=OPEN_COLOUR, linewidth=0.9, zorder=0)
+        ax.hlines(
+            range(len(names)), arc.t[0], arc.t[-1], color=OPEN_COLOUR, linewidth=line_width(0.9), zorder=0
+        )
     for k, name in enumerate(names):
         times = _impacts(arc, name)
-        ax.vlines(times, k - 0.5 * MARK, k + 0.5 * MARK, color=IMPACT_COLOUR, linewidth=0.9)
+        ax.vlines(times, k - 0.5 * MARK, k + 0.5 * MARK, color=IMPACT_COLOUR, linewidth=line_width(0.9))
     ax.set_yticks(range(len(names)), names)
     ax.set_ylim(len(names) - 0.4, -0.6)
     ax.margins(x=0)
     plain(ax)
-    bands = [Patch(facecolor=colour, label=state) for state, colour in STATES.items() if state in seen]
+    shown = [state for state in STATES if state in seen]
+    bands = [Patch(facecolor=colour_of(STATES[state]), label=state) for state in shown]
     small_legend(
         ax,
         [
-            Line2D([], [], color=OPEN_COLOUR, linewidth=0.9, label="open"),
+            Line2D([], [], color=OPEN_COLOUR, linewidth=line_width(0.9), label="open"),
             *bands,
             Line2D([], [], color=IMPACT_COLOUR, marker="|", linestyle="", label="impact"),
         ],

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
 from hybrid import arguments
-from hybrid.display.tables import with_unit
 from hybrid.errors import ArgumentError
+from hybrid.plot.axes import (
+    Rows,
+    as_component,
+    axes_for,
+    dot_area,
+    mark,
+    plain,
+    told,
+)
+from hybrid.plot.labels import label_of
+from hybrid.plot.legends import small_legend
 from hybrid.plot.orbits import beside
-from hybrid.plot.style import COLOURS, Rows, as_component, axes_for, dot_area, mark, plain, small_legend, told
+from hybrid.plot.picture import Look, picture
+from hybrid.plot.styles import colour_of, dot_size, line_width
 from hybrid.status import StatusCode
 
 if TYPE_CHECKING:
@@ -23,14 +34,14 @@ FAILED_COLOUR = "#B2182B"
 ENDS, SECTION = ("x_end", "outputs_end"), ("section", "section_outputs")
 
 
+@picture
 def plot_ends(
     ends: xarray.Dataset,
     x: str | int = 0,
     y: str | int | None = None,
     *,
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
     size: float | None = None,
+    **look: Unpack[Look],
 ) -> Axes:
     """Draw where many runs end, in the plane of two components or outputs: one colour per mode.
 
@@ -43,12 +54,6 @@ def plot_ends(
     x, y
         Names or indices of components, or names of outputs that the dataset has; by default the first two
         components. The ends of a state with one component are drawn over the starts.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
-    size
-        Diameter of the dots in points; by default smaller for more dots.
 
     Returns
     -------
@@ -77,12 +82,12 @@ def plot_ends(
     if other is None:
         across, other, over = ends.x0.values[:, 0], first, f"start of {over}"
     last, up = column("y", ends, other, ENDS)
-    area = dot_area(ends.sizes["start"], size)
-    (ax,) = axes_for(ax, 1, (5.0, 4.2), figsize)
+    area = dot_area(across, up, size)
+    (ax,) = axes_for(look, 1, (5.0, 4.2))
     modes, good = ends.mode_end.values.astype(str), ends.status.values == StatusCode.SUCCESS
     for index, mode in enumerate(sorted(set(modes[good]))):
         there = good & (modes == mode)
-        colour = COLOURS[index % len(COLOURS)]
+        colour = colour_of(index)
         ax.scatter(across[there], up[there], s=area, color=colour, linewidths=0, label=mode, rasterized=True)
     if not good.all():
         label = told(ends.status.values, WHERE)
@@ -95,13 +100,8 @@ def plot_ends(
     return ax
 
 
-def plot_sweep(
-    swept: xarray.Dataset,
-    *,
-    ax: Any = None,
-    figsize: tuple[float, float] | None = None,
-    size: float | None = None,
-) -> Rows:
+@picture
+def plot_sweep(swept: xarray.Dataset, *, size: float | None = None, **look: Unpack[Look]) -> Rows:
     """Draw each number of a sweep: over one axis as dots on a line, over two axes as a map.
 
     Parameters
@@ -110,10 +110,6 @@ def plot_sweep(
         From :func:`hybrid.sweep`, over one or two axes.
     ax
         Axes to draw into, one per number; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
-    size
-        Diameter of the dots in points; by default smaller for more dots.
 
     Returns
     -------
@@ -147,12 +143,13 @@ def plot_sweep(
     ]
     if not numbers:
         raise ArgumentError(f"swept must hold one real number per point to be drawn; {_instead(swept, dims)}")
-    area = dot_area(swept.status.size, size)
+    places = np.arange(swept.status.size)
+    area = dot_area(places, places, size)
     high = 1.5 if len(dims) == 1 else 3.0
-    axes = axes_for(ax, len(numbers), (6.4, 0.8 + high * len(numbers)), figsize)
+    axes = axes_for(look, len(numbers), (6.4, 0.8 + high * len(numbers)))
     failed = swept.status.values != StatusCode.SUCCESS
     for row, name in zip(axes, numbers, strict=True):
-        label = with_unit(name, swept[name].attrs.get("units"))
+        label = label_of(name, swept[name].attrs.get("units"))
         if len(dims) == 1:
             _draw_line(row, swept, dims[0], name, failed, area)
             row.set_ylabel(label)
@@ -169,7 +166,14 @@ def plot_sweep(
 def _draw_line(ax: Axes, swept: xarray.Dataset, dim: str, name: str, failed: np.ndarray, area: float) -> None:
     at, values = swept[dim].values, swept[name].values
     order = np.argsort(at)
-    ax.plot(at[order], values[order], "o-", color=COLOURS[0], linewidth=0.9, markersize=np.sqrt(area))
+    ax.plot(
+        at[order],
+        values[order],
+        "o-",
+        color=colour_of(0),
+        linewidth=line_width(0.9),
+        markersize=np.sqrt(area),
+    )
     if failed.any():
         mark(ax, at[failed], "|", FAILED_COLOUR, told(swept.status.values, WHERE))
 
@@ -185,7 +189,9 @@ def _draw_map(
     if failed.any():
         rows, columns = np.nonzero(failed)
         said = told(swept.status.values, WHERE)
-        ax.plot(x[columns], y[rows], "x", color=FAILED_COLOUR, markersize=5, label=said, clip_on=False)
+        ax.plot(
+            x[columns], y[rows], "x", color=FAILED_COLOUR, markersize=dot_size(5), label=said, clip_on=False
+        )
     ax.set_ylabel(_axis_label(swept, down))
 
 
@@ -217,7 +223,7 @@ def _instead(swept: xarray.Dataset, dims: tuple[str, ...]) -> str:
 
 
 def _axis_label(swept: xarray.Dataset, name: str) -> str:
-    return with_unit(name, swept[name].attrs.get("units"))
+    return label_of(name, swept[name].attrs.get("units"))
 
 
 def column(
@@ -245,5 +251,5 @@ def column_label(dataset: xarray.Dataset, name: str) -> str:
     """The name of a component or an output with its unit, if the dataset has one."""
     for axis, unit in (("state", "unit"), ("output", "output_unit")):
         if unit in dataset.coords and name in dataset[axis].values:
-            return with_unit(name, str(dataset[unit].sel({axis: name}).values))
+            return label_of(name, str(dataset[unit].sel({axis: name}).values))
     return name

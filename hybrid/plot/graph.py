@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import attrs
 import numpy as np
 
-from hybrid.plot.style import axes_for, colour_of
+from hybrid.plot.axes import (
+    axes_for,
+)
+from hybrid.plot.picture import Look, picture
+from hybrid.plot.styles import colour_of, small_text
 from hybrid.system.elements import END, Transition
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.members import about_all, shared_name
@@ -30,9 +34,8 @@ Ends = tuple[str, str]
 LABEL: dict[str, Any] = {"fontsize": 10, "bbox": {"boxstyle": "square,pad=0.15", "fc": "white", "ec": "none"}}
 
 
-def plot_graph(
-    system: HybridSystem, *, ax: Axes | None = None, figsize: tuple[float, float] | None = None
-) -> Axes:
+@picture
+def plot_graph(system: HybridSystem, **look: Unpack[Look]) -> Axes:
     """Draw the mode graph: modes as boxes, transitions as arrows, with the directions of their guards.
 
     A label's upward arrow means that the guard rises through zero, a downward arrow that it falls. The label
@@ -46,10 +49,6 @@ def plot_graph(
     ----------
     system
         The model.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Returns
     -------
@@ -65,7 +64,7 @@ def plot_graph(
     """
     graph = as_system("system", system).graph
     crowd = len(graph)
-    (ax,) = axes_for(ax, 1, SIZES[min(crowd, len(SIZES)) - 1], figsize)
+    (ax,) = axes_for(look, 1, SIZES[min(crowd, len(SIZES)) - 1])
     where = _places(graph)
     boxes = {
         mode: _draw_mode(ax, mode, where[mode], colour_of(system.mode_index(mode)))
@@ -97,7 +96,16 @@ def plot_graph(
             angle = middle + FAN * (slot - (len(around) - 1) / 2)
             _draw_loop(ax, edge, where[mode], np.radians(angle))
     _frame(ax, np.array(list(where.values())), bool(loops))
-    ax.text(0.5, 0.0, _key(system), transform=ax.transAxes, ha="center", va="top", fontsize=8, color="0.35")
+    ax.text(
+        0.5,
+        0.0,
+        _key(system),
+        transform=ax.transAxes,
+        ha="center",
+        va="top",
+        fontsize=small_text(),
+        color="0.35",
+    )
     return ax
 
 

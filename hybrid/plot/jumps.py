@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, Unpack
 
 import numpy as np
 
 from hybrid import arguments
-from hybrid.display.tables import with_unit
-from hybrid.plot.style import COLOURS, Rows, axes_for, colour_of, mark, plain, small_legend
+from hybrid.plot.axes import (
+    Rows,
+    axes_for,
+    mark,
+    plain,
+)
+from hybrid.plot.labels import label_of
+from hybrid.plot.legends import small_legend
+from hybrid.plot.picture import Look, picture
+from hybrid.plot.styles import colour_of, dot_size
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.jumps import Jumps
-from hybrid.simulation.labelled import Names
 from hybrid.system.members import about_all, shared_name, shared_names
 
 if TYPE_CHECKING:
@@ -43,7 +50,8 @@ class ErrorBounds(Protocol):
         ...
 
 
-def plot_jumps(jumps: Jumps, *, ax: Axes | None = None, figsize: tuple[float, float] | None = None) -> Axes:
+@picture
+def plot_jumps(jumps: Jumps, **look: Unpack[Look]) -> Axes:
     """Draw jumps over time: one row per transition, dots for grazings, triangles for limits of chatter.
 
     The row of a clock says when it ticks. The members of a repeat have a line each, in one row.
@@ -52,10 +60,6 @@ def plot_jumps(jumps: Jumps, *, ax: Axes | None = None, figsize: tuple[float, fl
     ----------
     jumps
         From an arc, ``arc.jumps``.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Returns
     -------
@@ -78,7 +82,7 @@ def plot_jumps(jumps: Jumps, *, ax: Axes | None = None, figsize: tuple[float, fl
     heights = np.array([1.0 + MEMBER * (len(each) - 1) for each in members])
     ends = np.cumsum(heights) - 0.5
     rows = ends - heights / 2
-    (ax,) = axes_for(ax, 1, (7.0, 1.0 + 0.4 * max(heights.sum(), 1.0)), figsize)
+    (ax,) = axes_for(look, 1, (7.0, 1.0 + 0.4 * max(heights.sum(), 1.0)))
     for i, each in enumerate(members):
         places = rows[i] + MEMBER * (np.arange(len(each)) - (len(each) - 1) / 2)
         for name, place in zip(each, places, strict=True):
@@ -90,7 +94,7 @@ def plot_jumps(jumps: Jumps, *, ax: Axes | None = None, figsize: tuple[float, fl
     labels = [name if clock is None else f"{name} ({clock})" for name, clock in pairs]
     ax.set_yticks(rows, labels)
     ax.set_ylim(heights.sum() - 0.5 if fired else 0.5, -0.5)
-    ax.set_xlabel(Names(system.state_names, system.units).label("t"))
+    ax.set_xlabel(label_of("t", system.units.get("t")))
     plain(ax)
     if seen and seen != ["transverse"]:
         for kind in seen:
@@ -107,12 +111,8 @@ def _mark(ax: Axes, jumps: Jumps, name: str, height: float, colour: str, size: f
             ax.plot(at, np.full(len(at), height), marker, color=colour, markersize=size)
 
 
-def plot_global_error(
-    result: ErrorBounds,
-    *,
-    ax: Axes | list[Axes] | None = None,
-    figsize: tuple[float, float] | None = None,
-) -> Rows:
+@picture
+def plot_global_error(result: ErrorBounds, **look: Unpack[Look]) -> Rows:
     """Draw the bounds of the errors: of the last state per component, below of the times of the jumps.
 
     Parameters
@@ -121,8 +121,6 @@ def plot_global_error(
         From :func:`hybrid.global_error`.
     ax
         Axes to draw into, two if the run has jumps, else one; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Returns
     -------
@@ -140,27 +138,28 @@ def plot_global_error(
     if not isinstance(getattr(result, "arc", None), HybridArc):
         raise arguments.refusal("result", "be a GlobalError, from hybrid.global_error", result)
     system, bounds = result.arc.system, result.jumps
-    names = Names(system.state_names, system.units)
     count = 2 if len(bounds) else 1
-    axes = axes_for(ax, count, (6.4, 0.8 + 2.2 * count), figsize, shared=False)
+    axes = axes_for(look, count, (6.4, 0.8 + 2.2 * count), shared=False)
     errors = result.x[[system.state_names.index(name) for name in system.own_names]]
     places, known = np.arange(len(errors)), np.isfinite(errors)
-    axes[0].plot(places[known], np.maximum(errors[known], LEAST), "o", color=COLOURS[0])
+    axes[0].plot(places[known], np.maximum(errors[known], LEAST), "o", color=colour_of(0))
     if not known.all():
-        mark(axes[0], places[~known], "^", COLOURS[1], "not known")
+        mark(axes[0], places[~known], "^", colour_of(1), "not known")
         small_legend(axes[0])
-    axes[0].set_xticks(places, [names.label(name) for name in system.own_names])
+    axes[0].set_xticks(places, [label_of(name, system.units.get(name)) for name in system.own_names])
     axes[0].set_xlim(-0.5, len(places) - 0.5)
     axes[0].set_ylabel("error of the last state")
     if len(bounds):
         t, known = result.arc.jumps.t, np.isfinite(bounds)
-        axes[1].plot(t[known], np.maximum(bounds[known], LEAST), "o", color=COLOURS[0], markersize=4)
+        axes[1].plot(
+            t[known], np.maximum(bounds[known], LEAST), "o", color=colour_of(0), markersize=dot_size(4)
+        )
         if not known.all():
             told = "not known: tighter runs jump differently"
-            mark(axes[1], t[~known], "|", COLOURS[1], told)
+            mark(axes[1], t[~known], "|", colour_of(1), told)
             small_legend(axes[1])
-        axes[1].set_xlabel(names.label("t"))
-        axes[1].set_ylabel(with_unit("error of jump times", system.units.get("t")))
+        axes[1].set_xlabel(label_of("t", system.units.get("t")))
+        axes[1].set_ylabel(label_of("error of jump times", system.units.get("t")))
     for row in axes:
         row.set_yscale("log")
         row.grid(True, axis="y", color="0.9")

@@ -3,31 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
 from hybrid import arguments
+from hybrid.display.tables import measured
 from hybrid.orbits.labelled import unfinished
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.sections import Section
 from hybrid.plot.arcs import plot_phase
-from hybrid.plot.style import axes_for, check_axes, colour_of, dot_area, legend, named_quantity, plain
-from hybrid.simulation.labelled import Names
+from hybrid.plot.axes import (
+    axes_for,
+    check_look,
+    dot_area,
+    named_quantity,
+    plain,
+)
+from hybrid.plot.labels import label_of
+from hybrid.plot.legends import legend, title_above
+from hybrid.plot.picture import Look, picture
+from hybrid.plot.styles import colour_of
 from hybrid.system.graph import HybridSystem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+@picture
 def plot_section(
     section: Section,
     x: str | int = 0,
     y: str | int | None = None,
     *,
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
     size: float | None = None,
+    **look: Unpack[Look],
 ) -> Axes:
     """Draw the points of a section in the plane of two components or outputs: one colour per mode.
 
@@ -38,12 +48,6 @@ def plot_section(
     x, y
         Names or indices of components, or names of outputs; by default the first two components. A state
         with one component is drawn over time.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
-    size
-        Diameter of the dots in points; by default smaller for more dots.
 
     Returns
     -------
@@ -66,30 +70,25 @@ def plot_section(
     arguments.instance("section", section, Section, "Make one with hybrid.stroboscopic_section.")
     system = section.system
     first, other = plane_of(system, x, y)
-    area = dot_area(len(section), size)
-    (ax,) = axes_for(ax, 1, (5.0, 4.2), figsize)
+    (ax,) = axes_for(look, 1, (5.0, 4.2))
     across, up = (section.t, section[first]) if other is None else (section[first], section[other])
-    modes = system.mode_names
+    area, modes = dot_area(across, up, size), system.mode_names
     visited = [index for index, mode in enumerate(modes) if np.any(section.mode == mode)]
     for index in visited:
         there = section.mode == modes[index]
         colour = colour_of(index)
         ax.scatter(across[there], up[there], s=area, color=colour, linewidths=0, rasterized=True)
-    labels = Names(system.state_names, system.units)
-    ax.set_xlabel(labels.label("t" if other is None else first))
-    ax.set_ylabel(labels.label(other or first))
+    across_name, up_name = ("t", first) if other is None else (first, other)
+    ax.set_xlabel(label_of(across_name, system.units.get(across_name)))
+    ax.set_ylabel(label_of(up_name, system.units.get(up_name)))
     plain(ax)
     legend(ax, modes, visited)
     return ax
 
 
+@picture
 def plot_orbit(
-    orbit: PeriodicOrbit,
-    x: str | int = 0,
-    y: str | int | None = None,
-    *,
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
+    orbit: PeriodicOrbit, x: str | int = 0, y: str | int | None = None, **look: Unpack[Look]
 ) -> Axes:
     """Draw a periodic orbit in the plane of two components or outputs, with period and largest multiplier.
 
@@ -101,10 +100,6 @@ def plot_orbit(
         From :func:`hybrid.periodic_orbit`.
     x, y
         Names or indices of components, or names of outputs; by default the first two components.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Returns
     -------
@@ -126,15 +121,13 @@ def plot_orbit(
     """
     arguments.instance("orbit", orbit, PeriodicOrbit, "Find one with hybrid.periodic_orbit.")
     first, other = plane_of(orbit.system, x, y)
-    check_axes(ax)
-    ax = plot_phase(orbit.arc(), first, other or first, ax=ax, figsize=figsize)
+    check_look(look)
+    ax = plot_phase(orbit.arc(), first, other or first, **look)
     largest = orbit.multipliers[0]
     number = f"{largest.real:.4g}" if largest.imag == 0 else f"{largest:.4g}"
-    period = f"{orbit.period:.6g} {orbit.system.units.get('t', '')}".rstrip()
-    # The row of the legend stands between the axes and the title.
-    pad = 6.0 if ax.get_legend() is None else 24.0
+    period = measured(f"{orbit.period:.6g}", orbit.system.units.get("t"))
     told = f"period {period}, largest multiplier {number}" if orbit.closes else unfinished(orbit)
-    ax.set_title(told, loc="left", fontsize=9, pad=pad)
+    title_above(ax, told)
     return ax
 
 

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, Unpack
 
 import numpy as np
 
 from hybrid import arguments
-from hybrid.plot.style import COLOURS, axes_for, plain
+from hybrid.plot.axes import (
+    axes_for,
+    plain,
+)
+from hybrid.plot.picture import Look, picture
+from hybrid.plot.styles import COLOURS, colour_of, dot_size, line_width, small_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,13 +50,8 @@ class Measurement(Protocol):
         ...
 
 
-def plot_work_precision(
-    result: Measurement,
-    quantity: str = "state",
-    *,
-    ax: Axes | None = None,
-    figsize: tuple[float, float] | None = None,
-) -> Axes:
+@picture
+def plot_work_precision(result: Measurement, quantity: str = "state", **look: Unpack[Look]) -> Axes:
     """Draw error over time on logarithmic scales: one line per method, the reference's own error in grey.
 
     Nearer to the lower left is better. Failed runs and errors of exactly zero are not drawn.
@@ -62,10 +62,6 @@ def plot_work_precision(
         From :func:`hybrid.work_precision`.
     quantity
         Which error: ``"state"``, ``"times"``, ``"saltation"``, ``"fundamental"`` or ``"exponents"``.
-    ax
-        Axes to draw into; by default those of a new figure.
-    figsize
-        Width and height of a new figure in inches.
 
     Returns
     -------
@@ -90,14 +86,21 @@ def plot_work_precision(
     if not hasattr(result, "error_of"):
         raise arguments.refusal("result", "be a WorkPrecision, from hybrid.work_precision", result)
     error = result.error_of(quantity)
-    (ax,) = axes_for(ax, 1, (6.4, 4.6), figsize)
+    (ax,) = axes_for(look, 1, (6.4, 4.6))
     ends = []
     for index, method in enumerate(result.methods):
         rows = result.rows_of(method) & np.isfinite(error) & (error > 0)
         if not np.any(rows):
             continue
-        colour, marker = COLOURS[index % len(COLOURS)], MARKERS[index // len(COLOURS) % len(MARKERS)]
-        ax.loglog(result.seconds[rows], error[rows], marker=marker, color=colour, markersize=4, linewidth=1.4)
+        colour, marker = colour_of(index), MARKERS[index // len(COLOURS) % len(MARKERS)]
+        ax.loglog(
+            result.seconds[rows],
+            error[rows],
+            marker=marker,
+            color=colour,
+            markersize=dot_size(4),
+            linewidth=line_width(1.4),
+        )
         ends.append((float(result.seconds[rows][-1]), float(error[rows][-1]), method, colour))
     floor = result.reference_error[quantity]
     if ends and np.isfinite(floor) and floor > 0:
@@ -135,6 +138,6 @@ def _label_ends(ax: Axes, ends: list[tuple[float, float, str, str]]) -> None:
             (6.0, height - y),
             textcoords="offset points",
             va="center",
-            fontsize=8,
+            fontsize=small_text(),
             color=colour,
         )

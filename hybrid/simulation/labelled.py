@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from hybrid.display.tables import with_unit
+from hybrid.display.tables import NO_UNIT, with_unit
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
 
@@ -50,7 +50,10 @@ class Names:
     @property
     def rate(self) -> dict[str, str]:
         """Attributes of a value per unit of time, such as an exponent."""
-        return {"units": f"1/{self.units['t']}"} if "t" in self.units else {}
+        unit = self.units.get("t")
+        if unit is None:
+            return {}
+        return {"units": "1" if unit in NO_UNIT else f"1/{unit}"}
 
 
 def with_outputs(

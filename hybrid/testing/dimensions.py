@@ -12,6 +12,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from hybrid.display.tables import NO_UNIT
 from hybrid.expression.values import values_of
 from hybrid.expression.vocabulary import TRUTHS, WHERE, named
 from hybrid.system.functions import CONDITION
@@ -34,7 +35,6 @@ MOST_FAULTS, MOST_NAMES = 5, 8
 ROUNDING = 1e-9
 # Factors in the code without a unit.
 PURE = (0.5, 1.0, 2.0)
-NO_UNIT = ("", "-", "[-]", "–", "—")
 # Nm, Ns and Nms are products, but pint reads Nm as "number meter", a unit of yarn.
 NEWTON = re.compile(r"\b([kMm]?N)(?=[ms])(m?)(s?)\b(?!\s*(?:\^|\*\*|[²³⁻]))")
 

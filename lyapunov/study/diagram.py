@@ -97,7 +97,7 @@ def write_diagram(folder: Path, found: Diagram) -> Path:
     import matplotlib.pyplot as plt
 
     path = folder / "diagram.png"
-    with style():
+    with style("chart"):
         figure = draw(found)
         figure.savefig(path)
     plt.close(figure)

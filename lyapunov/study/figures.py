@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lyapunov.convergence import COLOURS, INK
+from hybrid.plot.styles import COLOURS, INK
 from lyapunov.floquet import floquet_exponents
 from lyapunov.plot import plot_convergence, plot_phase_portrait, style
 from lyapunov.study.paper import ROWS
@@ -40,7 +40,7 @@ ESTIMATES = (
 def write_figures(folder: Path, regimes: Sequence[Regime]) -> list[Path]:
     """Write a phase portrait and the convergence of each regime, and a comparison; return the paths."""
     paths = []
-    with style():
+    with style("chart"):
         for regime in regimes:
             paths.append(_save(portrait(regime), folder / f"portrait_{regime.omega:.2f}.png"))
             paths.append(_save(convergence(regime), folder / f"convergence_{regime.omega:.2f}.png"))
@@ -50,7 +50,7 @@ def write_figures(folder: Path, regimes: Sequence[Regime]) -> list[Path]:
 
 def write_tolerance_figure(folder: Path, trap: Trap) -> Path:
     """Write the errors of tangent vectors outside the error control as ``tolerances.png``."""
-    with style():
+    with style("chart"):
         return _save(tolerances(trap), folder / "tolerances.png")
 
 
@@ -64,7 +64,8 @@ def portrait(regime: Regime) -> Figure:
 
     figure, axes = plt.subplots(1, 2, figsize=(8.4, 3.8))
     for ax, (body, x, v, labels) in zip(axes, BODIES, strict=True):
-        plot_phase_portrait(regime.arc, x, v, section=regime.section.x, labels=labels, ax=ax)
+        plot_phase_portrait(regime.arc, x, v, section=regime.section.x, ax=ax)
+        ax.set(xlabel=labels[0], ylabel=labels[1])
         ax.set_title(body)
     figure.suptitle(f"{_title(regime)}: orbit and stroboscopic section", x=0.01, ha="left", fontsize=10.5)
     return figure

@@ -9,9 +9,9 @@ import attrs
 import numpy as np
 
 from hybrid import HybridArc, arguments
-from hybrid.plot.style import as_component
-from lyapunov.convergence import COLOURS
-from lyapunov.plot import axis_labels, plot_convergence, plot_phase_portrait
+from hybrid.plot.axes import as_component
+from hybrid.plot.styles import COLOURS
+from lyapunov.plot import plot_convergence, plot_phase_portrait
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,10 +50,11 @@ def plot_regimes(panels: Sequence[Panel], x: str, y: str, *, labels: tuple[str, 
         x, y = (
             system.state_names[as_component(name, system.state_names, c)] for name, c in (("x", x), ("y", y))
         )
-    labels = axis_labels(labels, x, y)
+    labels = _axis_labels(labels, x, y)
     figure, axes = plt.subplots(3, len(panels), figsize=(3.2 * len(panels), 7.6), squeeze=False)
     for column, panel in zip(axes.T, panels, strict=True):
-        plot_phase_portrait(panel.arc, x, y, section=panel.section, labels=labels, ax=column[0])
+        plot_phase_portrait(panel.arc, x, y, section=panel.section, ax=column[0])
+        column[0].set(xlabel=labels[0], ylabel=labels[1])
         _plot_section(column[1], panel, x, y, labels)
         plot_convergence({"first exponent": panel.history}, truth=0.0, ax=column[2])
         column[2].get_legend().remove()
@@ -82,3 +83,13 @@ def _plot_section(ax: Axes, panel: Panel, x: str, y: str, labels: tuple[str, str
         ax.set_ylim(b - radius[1], b + radius[1])
     ax.set_xlabel(labels[0])
     ax.set_ylabel(labels[1])
+
+
+def _axis_labels(labels: object, *names: str) -> tuple[str, str]:
+    """Labels of the two axes."""
+    if labels is None:
+        return names[0], names[1]
+    texts = arguments.items("labels", labels, "be a pair of texts")
+    if len(texts) != 2 or not all(isinstance(text, str) for text in texts):
+        raise arguments.refusal("labels", "be a pair of texts", labels)
+    return texts[0], texts[1]

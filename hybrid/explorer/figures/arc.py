@@ -19,7 +19,7 @@ from hybrid.explorer.figures.base import (
     source,
 )
 from hybrid.plot.arcs import curves
-from hybrid.plot.style import colour_of
+from hybrid.plot.styles import colour_of
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.labelled import Names
 from hybrid.system.graph import HybridSystem

@@ -11,7 +11,7 @@ from bokeh.plotting import figure
 from hybrid.explorer.figures.base import States, blank, empty, source, zero_line
 from hybrid.orbits.continuation.branch import Branch
 from hybrid.orbits.labelled import table_at
-from hybrid.plot.style import COLOURS
+from hybrid.plot.styles import COLOURS
 from hybrid.simulation.labelled import Names
 from hybrid.system.graph import HybridSystem
 

@@ -7,7 +7,7 @@ from bokeh.models import HoverTool, Range1d, Whisker
 
 from hybrid.explorer.figures.base import JUMP, Axes, blank, empty, ends_of, source, zero_line
 from hybrid.orbits.orbit import PeriodicOrbit
-from hybrid.plot.style import COLOURS
+from hybrid.plot.styles import COLOURS
 from hybrid.system.graph import HybridSystem
 from lyapunov.spectrum import LyapunovSpectrum
 

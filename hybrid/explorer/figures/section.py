@@ -9,7 +9,7 @@ from bokeh.models import LinearColorMapper
 
 from hybrid.explorer.figures.base import HELD, ORBIT, START, Axes, States, blank, empty, extent_of, source
 from hybrid.plot.basins import NONE_COLOUR, VIOLATES_COLOUR
-from hybrid.plot.style import COLOURS
+from hybrid.plot.styles import COLOURS
 from hybrid.simulation.labelled import Names
 from hybrid.system.graph import HybridSystem
 

@@ -12,7 +12,7 @@ import models
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition, simulate, stroboscopic_section
 from hybrid.plot import plot_arc, plot_phase, plot_section
 from hybrid.plot.orbits import beside
-from hybrid.plot.style import COLOURS
+from hybrid.plot.styles import COLOURS
 
 # A point on a circle that goes on at twice the speed below the axis, and counts its turns.
 TURNS = HybridSystem(

@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 from hybrid import After, At, Every, Guard, HybridSystem, Mode, Reset, Transition, simulate
 from hybrid.plot import plot_graph, plot_jumps
 from hybrid.plot.graph import FAN, SIZES
-from hybrid.plot.style import COLOURS
+from hybrid.plot.styles import COLOURS
 
 
 @pytest.fixture(autouse=True)

@@ -11,7 +11,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 from hybrid.plot import plot_work_precision
-from hybrid.plot.style import COLOURS
+from hybrid.plot.styles import COLOURS
 from hybrid.plot.work_precision import LABEL_HEIGHT, MARKERS
 
 

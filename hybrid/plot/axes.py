@@ -1,4 +1,4 @@
-"""Shared parts of all plots: colours, axes and legends; matplotlib is imported only when needed."""
+"""Shared parts of all plots: axes, components and dots; matplotlib is imported only when needed."""
 
 from __future__ import annotations
 
@@ -6,9 +6,12 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hybrid import arguments
 from hybrid.errors import ArgumentError
+from hybrid.plot.picture import Look
+from hybrid.plot.styles import USUAL_MARKER, current, dot_size
 from hybrid.simulation.quantities import words_for
 from hybrid.status import StatusCode
 from hybrid.system.graph import HybridSystem
@@ -17,19 +20,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# One colour per mode: the palette of Okabe and Ito, distinguishable with any colour vision, faint hues last.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-
-# Entries of a legend in one row.
-MOST_COLUMNS = 5
-
-# Characters in a row of the legend of modes, and those that the line before each name takes.
-ROW, HANDLE = 72, 7
-
-# Largest number of members of a repeat that a legend lists.
-MOST_LISTED = 5
 # Diameter in points of a dot that fills a page.
 LARGEST_DOT = 1000.0
+# Areas of dots in square points: the least that is seen, that of a few dots, and of all dots together.
+LEAST_DOT, USUAL_DOT, LARGEST_SHARE = 1.5, 20.0, 6000.0
+# Dots nearer than this part of the height or the width of a picture are drawn on each other.
+CELLS = 300
 
 
 def as_component(name: str, names: Sequence[str], component: object, outputs: Iterable[str] = ()) -> int:
@@ -55,10 +51,11 @@ def named_quantity(argument: str, system: HybridSystem, given: object) -> str:
     return system.quantity_names[as_component(argument, system.state_names, given, system.outputs)]
 
 
-def check_axes(ax: object, figsize: object = None) -> None:
+def check_look(look: Look) -> None:
     """Raise an ArgumentError if ``ax`` is neither None nor matplotlib axes, or ``figsize`` no size."""
-    if ax is not None:
-        _as_axes(ax)
+    if look.get("ax") is not None:
+        _as_axes(look["ax"])
+    figsize = look.get("figsize")
     if figsize is not None:
         _as_figsize(figsize)
 
@@ -85,26 +82,23 @@ class Rows(np.ndarray):
 
 
 def axes_for(
-    ax: Any,
-    count: int,
-    default: tuple[float, float] | None = None,
-    figsize: tuple[float, float] | None = None,
-    *,
-    shared: bool = True,
+    look: Look, count: int, default: tuple[float, float] | None = None, *, shared: bool = True
 ) -> Rows:
     """The given axes, or those of a new figure in a column, as an array of ``count``.
 
-    The size of the figure is ``figsize`` if a caller gives one, else ``default``. Axes that are ``shared``
-    have one abscissa.
+    The size of the figure is ``figsize`` if a caller gives one, else ``default`` as the style has it. Axes
+    that are ``shared`` have one abscissa.
     """
+    ax, figsize = look.get("ax"), look.get("figsize")
     if figsize is not None:
         figsize = _as_figsize(figsize)
     if ax is None:
         # pyplot knows the figure, so a notebook and plt.show() show it: once, since no plot returns it.
         import matplotlib.pyplot as plt
 
-        size = figsize or default or (7.0, 0.8 + 1.5 * count)
-        _, made = plt.subplots(count, 1, sharex=shared, squeeze=False, figsize=size, layout="constrained")
+        size = figsize or current().size(default or (7.0, 0.8 + 1.5 * count))
+        options: dict[str, Any] = {"figsize": size, "layout": "constrained", **_kept_style()}
+        _, made = plt.subplots(count, 1, sharex=shared, squeeze=False, **options)
         return made[:, 0].view(Rows)
     try:
         axes = np.atleast_1d(np.array(ax, dtype=object)).ravel()
@@ -117,17 +111,22 @@ def axes_for(
     return axes.view(Rows)
 
 
+def _kept_style() -> dict[str, Any]:
+    """What makes a new figure keep the settings of the style."""
+    settings = current().settings
+    if not settings:
+        return {}
+    from hybrid.plot.figure import StyledFigure
+
+    return {"FigureClass": StyledFigure, "settings": settings}
+
+
 def _as_figsize(value: object) -> tuple[float, float]:
     wanted = "be a width and a height in inches, both positive"
     found = arguments.numbers("figsize", value, wanted)
     if found.shape != (2,) or not np.all(np.isfinite(found) & (found > 0)):
         raise arguments.refusal("figsize", wanted, value)
     return float(found[0]), float(found[1])
-
-
-def colour_of(mode: int) -> str:
-    """The colour of the mode with this index."""
-    return COLOURS[mode % len(COLOURS)]
 
 
 def member_colours(count: int) -> list[Any]:
@@ -137,69 +136,41 @@ def member_colours(count: int) -> list[Any]:
     return [colormaps["viridis"](place) for place in np.linspace(0.0, 0.85, count)]
 
 
-def member_legend(ax: Axes, names: Sequence[str], colours: Sequence[Any]) -> None:
-    """A legend of the members of a repeat on the right: all of a few, otherwise the first and the last."""
-    from matplotlib.lines import Line2D
-
-    count = len(names)
-    places = range(count) if count <= MOST_LISTED else (0, count - 1)
-    handles = [Line2D([], [], color=colours[i], label=names[i].rpartition(".")[0]) for i in places]
-    ax.legend(handles=handles, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=8)
-
-
 def plain(ax: Axes) -> None:
     """Hide the frame at the top and on the right."""
     ax.spines[["top", "right"]].set_visible(False)
 
 
-def legend(ax: Axes, names: Sequence[str], modes: Iterable[int]) -> None:
-    """Add a legend of ``modes`` above the axes, if the system has more than one."""
-    if len(names) < 2:
-        return
-    from matplotlib.lines import Line2D
+def dot_area(across: ArrayLike, up: ArrayLike, size: float | None = None) -> float:
+    """Area of each dot of a cloud, as the square of its diameter in points.
 
-    handles = [Line2D([], [], color=colour_of(mode), label=names[mode]) for mode in modes]
-    if not handles:
-        return
-    # Long names take several rows, so that they are no wider than the picture.
-    widths = [HANDLE + len(str(each.get_label())) for each in handles]
-    columns = len(handles) if sum(widths) <= ROW else max(1, ROW // max(widths))
-    ax.legend(
-        handles=handles,
-        loc="lower left",
-        bbox_to_anchor=(0, 1),
-        ncols=columns,
-        frameon=False,
-        borderaxespad=0.2,
-    )
-
-
-def dot_area(count: int, size: float | None = None) -> float:
-    """Area of each dot, as the square of its diameter in points.
-
-    The diameter is ``size``; by default larger for few dots, smaller for many, and a point at least.
+    The diameter is ``size``. By default it follows from the number of dots that can be told apart: larger
+    for few, smaller for many, but large enough to be seen. Points that lie on each other are one dot.
     """
     if size is not None:
-        wanted = "be a positive diameter in points, at most 1000"
-        diameter = arguments.positive("size", size, wanted)
-        if diameter > LARGEST_DOT:
-            raise arguments.refusal("size", wanted, size)
-        return diameter**2
-    return float(np.clip(4000 / max(count, 1), 1.0, 20.0))
+        return diameter(size) ** 2
+    share = (dot_size(USUAL_MARKER) / USUAL_MARKER) ** 2
+    return max(LEAST_DOT, share * min(LARGEST_SHARE / max(_apart(across, up), 1), USUAL_DOT))
 
 
-def small_legend(ax: Axes, handles: list[Any] | None = None) -> None:
-    """A legend above the axes, in rows of five, of the given handles or of what the axes hold."""
-    found = ax.get_legend_handles_labels()[0] if handles is None else handles
-    ax.legend(
-        handles=found,
-        loc="lower right",
-        bbox_to_anchor=(1, 1),
-        ncols=min(len(found), MOST_COLUMNS),
-        frameon=False,
-        borderaxespad=0.2,
-        fontsize=8,
-    )
+def diameter(size: object) -> float:
+    """The diameter of a dot in points."""
+    wanted = "be a positive diameter in points, at most 1000"
+    found = arguments.positive("size", size, wanted)
+    if found > LARGEST_DOT:
+        raise arguments.refusal("size", wanted, size)
+    return found
+
+
+def _apart(across: ArrayLike, up: ArrayLike) -> int:
+    """How many dots can be told apart: cells of the picture that hold some."""
+    points = np.column_stack([np.asarray(each, dtype=float).ravel() for each in (across, up)])
+    points = points[np.isfinite(points).all(axis=1)]
+    if not len(points):
+        return 0
+    low, extent = points.min(axis=0), np.ptp(points, axis=0)
+    cells = np.floor((points - low) / np.where(extent > 0, extent, 1.0) * CELLS).astype(int)
+    return len(np.unique(cells[:, 0] * (CELLS + 1) + cells[:, 1]))
 
 
 def told(codes: Any, where: str) -> str:
@@ -215,7 +186,7 @@ def mark(ax: Axes, at: Any, marker: str, colour: str, label: str, *, size: float
         np.full(len(at), 0.02),
         marker,
         color=colour,
-        markersize=size,
+        markersize=dot_size(size),
         transform=ax.get_xaxis_transform(),
         label=label,
         clip_on=False,

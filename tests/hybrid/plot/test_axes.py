@@ -9,7 +9,9 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 from hybrid import ArgumentError
-from hybrid.plot.style import COLOURS, as_component, axes_for, colour_of, dot_area, legend, plain
+from hybrid.plot.axes import as_component, axes_for, dot_area, plain
+from hybrid.plot.legends import legend
+from hybrid.plot.styles import COLOURS, colour_of
 
 
 @pytest.fixture(autouse=True)
