@@ -15,6 +15,7 @@ from hybrid.plot.axes import (
     axes_for,
     diameter,
     dot_area,
+    logarithmic,
     mark,
     named_quantity,
     told,
@@ -364,7 +365,7 @@ def plot_comparison(result: ModelComparison, **look: Unpack[Look]) -> Axes:
         else:
             told = "the same exponents" if np.any(distance == 0) else "every run failed"
             mark(ax, [cost], "v", colour, f"{name}: {told}")
-    ax.set_yscale("log")
+    logarithmic(ax, "y")
     ax.set_xlabel("steps per interval")
     ax.set_ylabel(label_of("largest distance of exponents", unit))
     ax.grid(True, axis="y")

@@ -28,7 +28,7 @@ SEARCH = {
     **{"tolerance": 0.01, "features": None, "together": None},
 }
 SAMPLE = {"seed": 0}
-FIGURE = {"ax": None, "figsize": None}
+FIGURE = {"ax": None, "figsize": None, "labels": None, "style": None}
 DEFAULTS = {
     hybrid.DOP853: TOLERANCES,
     hybrid.RadauIIA: TOLERANCES,
@@ -163,6 +163,7 @@ DEFAULTS = {
     hybrid.plot.plot_section: {"x": 0, "y": None, "size": None, **FIGURE},
     hybrid.plot.plot_sweep: {"size": None, **FIGURE},
     hybrid.plot.plot_work_precision: {"quantity": "state", **FIGURE},
+    hybrid.plot.style: {"name": None, "labels": None},
 }
 
 

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 LARGEST_DOT = 1000.0
 # Areas of dots in square points: the least that is seen, that of a few dots, and of all dots together.
 LEAST_DOT, USUAL_DOT, LARGEST_SHARE = 1.5, 20.0, 6000.0
+# Points whose spread is this share of their size are one; the picture shows this share on either side.
+ROUNDING, WIDE = 1e-9, 0.05
 # Dots nearer than this part of the height or the width of a picture are drawn on each other.
 CELLS = 300
 
@@ -134,6 +136,30 @@ def member_colours(count: int) -> list[Any]:
     from matplotlib import colormaps
 
     return [colormaps["viridis"](place) for place in np.linspace(0.0, 0.85, count)]
+
+
+def logarithmic(ax: Axes, axis: str) -> None:
+    """A logarithmic scale with two labels at least, those of powers of ten alone.
+
+    ``axis`` is ``"x"`` or ``"y"``.
+    """
+    from matplotlib.ticker import NullFormatter
+
+    getattr(ax, f"set_{axis}scale")("log")
+    getattr(ax, f"{axis}axis").set_minor_formatter(NullFormatter())
+    low, high = np.log10(getattr(ax, f"get_{axis}lim")())
+    if np.floor(high) - np.ceil(low) < 1:
+        getattr(ax, f"set_{axis}lim")(*np.power(10.0, [np.floor(low), np.ceil(high)]))
+
+
+def show_spread(ax: Axes, across: ArrayLike, up: ArrayLike) -> None:
+    """Limits around points that differ by rounding alone, as one point has them."""
+    for values, limit in ((across, ax.set_xlim), (up, ax.set_ylim)):
+        found = np.asarray(values, dtype=float)
+        found = found[np.isfinite(found)]
+        size = float(np.abs(found).max(initial=0.0))
+        if len(found) and np.ptp(found) <= ROUNDING * size:
+            limit(found.mean() - WIDE * size, found.mean() + WIDE * size)
 
 
 def plain(ax: Axes) -> None:

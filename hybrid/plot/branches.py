@@ -183,7 +183,7 @@ def _quantity_of(branch: AnyBranch, y: object) -> str:
 
 def _draw_branch(ax: Axes, branch: AnyBranch, name: str, label: str | None) -> None:
     """Lines of a branch in the next colour, its bifurcations, and what a legend needs."""
-    colour = colour_of(sum(each.get_gid() == OF_BRANCH for each in ax.lines))
+    colour = _next_colour(ax)
     if label is not None:
         ax.plot([], [], "-", color=colour, lw=line_width(LINE), label=label)
     across, values, stable, admissible = _with_bifurcations(branch, name)
@@ -205,6 +205,11 @@ def _draw_branch(ax: Axes, branch: AnyBranch, name: str, label: str | None) -> N
     found: list[Any] = [*branch.bifurcations]
     there = _there(branch, name)
     _mark(ax, [(each.kind, each.value, up) for each, up in zip(found, there, strict=True)])
+
+
+def _next_colour(ax: Axes) -> str:
+    """The colour of the next branch or curve in the axes."""
+    return colour_of(sum(each.get_gid() == OF_BRANCH for each in ax.lines))
 
 
 def _there(branch: AnyBranch, name: str) -> np.ndarray:
@@ -345,7 +350,9 @@ def plot_curve(curve: BifurcationCurve | EquilibriumCurve, **look: Unpack[Look])
         arguments.instance("curve", curve, BifurcationCurve, "Make one with hybrid.continue_bifurcation.")
     (ax,) = axes_for(look, 1, (5.4, 4.2))
     first, second = curve.names
-    ax.plot(curve[first], curve[second], lw=line_width(1.4), label=curve.kind)
+    style: dict[str, Any] = {"color": _next_colour(ax), "lw": line_width(LINE)}
+    (line,) = ax.plot(curve[first], curve[second], label=curve.kind, **style)
+    line.set_gid(OF_BRANCH)
     _mark(ax, [(each.kind, each.values[first], each.values[second]) for each in curve.points])
     units = curve.system.units
     ax.set_xlabel(label_of(first, units.get(first)))

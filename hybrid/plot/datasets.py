@@ -15,6 +15,7 @@ from hybrid.plot.axes import (
     dot_area,
     mark,
     plain,
+    show_spread,
     told,
 )
 from hybrid.plot.labels import label_of
@@ -94,6 +95,7 @@ def plot_ends(
         ax.scatter(across[~good], up[~good], s=25.0, color=FAILED_COLOUR, marker="x", label=label)
     ax.set_xlabel(over)
     ax.set_ylabel(column_label(ends, last))
+    show_spread(ax, across[good], up[good])
     plain(ax)
     if len(set(modes[good])) > 1 or not good.all():
         small_legend(ax)

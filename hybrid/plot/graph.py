@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any, Unpack
 import attrs
 import numpy as np
 
+from hybrid.plot.apart import CurveLabel, keep_apart, keep_inside, lay_out, point_on
 from hybrid.plot.axes import (
     axes_for,
 )
+from hybrid.plot.legends import room, wrapped
 from hybrid.plot.picture import Look, picture
-from hybrid.plot.styles import colour_of, small_text
+from hybrid.plot.styles import colour_of, line_width, small_text, text_size
 from hybrid.system.elements import END, Transition
 from hybrid.system.graph import HybridSystem, as_system
 from hybrid.system.members import about_all, shared_name
@@ -28,10 +30,14 @@ DIRECTIONS = {-1: "↓", 0: "↕", 1: "↑"}
 FAN = 60.0
 # Sizes of a figure, by the number of modes, in inches.
 SIZES = ((4.0, 2.6), (6.0, 2.8), (7.0, 6.0), (7.0, 6.0), (8.5, 7.0))
+# Height of the key below a graph, in the units of the places of modes.
+FOR_KEY = 0.5
 # A graph of so many modes is drawn with less detail.
 CROWD = 5
 Ends = tuple[str, str]
-LABEL: dict[str, Any] = {"fontsize": 10, "bbox": {"boxstyle": "square,pad=0.15", "fc": "white", "ec": "none"}}
+# Sizes of the letters of modes and of transitions, in points.
+OF_MODES, OF_EDGES = 12.0, 10.0
+LABEL_BOX = {"boxstyle": "square,pad=0.15", "fc": "white", "ec": "none"}
 
 
 @picture
@@ -62,6 +68,8 @@ def plot_graph(system: HybridSystem, **look: Unpack[Look]) -> Axes:
     >>> [text.get_text() for text in ax.texts[:3]]
     ['below', 'above', 'sliding']
     """
+    from matplotlib.text import Annotation
+
     graph = as_system("system", system).graph
     crowd = len(graph)
     (ax,) = axes_for(look, 1, SIZES[min(crowd, len(SIZES)) - 1])
@@ -74,21 +82,19 @@ def plot_graph(system: HybridSystem, **look: Unpack[Look]) -> Axes:
         boxes[END] = _draw_end(ax, where[END])
     edges, loops = _edges_and_loops(system)
     parallel: Counter[tuple[str, str]] = Counter()
+    labels: list[CurveLabel] = []
     for ends, bundle in _bundles(edges, crowd):
         bend = (0.28 if crowd < CROWD else 0.12) + 0.3 * parallel[ends]
         parallel[ends] += 1
         # With many modes the edges cross near their middles, so the labels are placed nearer the source.
         along = 0.5 if crowd <= 2 else 0.38
         label = "\n".join(dict.fromkeys(each.label(short=crowd >= CROWD) for each in bundle))
-        _draw_edge(
-            ax,
-            label,
-            bundle[0].style,
-            [where[end] for end in ends],
-            bend,
-            along,
-            [boxes[end] for end in ends],
+        curve = _draw_arrow(
+            ax, bundle[0].style, [where[end] for end in ends], bend, [boxes[end] for end in ends]
         )
+        middle = point_on(curve, along)
+        text = ax.text(middle[0], middle[1], label, ha="center", va="center", zorder=3, **_label_style())
+        labels.append(CurveLabel(text, curve, along))
     for mode, around in loops.items():
         outward = where[mode] if crowd > 2 else np.array([0.0, 1.0])
         middle = np.degrees(np.arctan2(outward[1], outward[0]))
@@ -96,16 +102,13 @@ def plot_graph(system: HybridSystem, **look: Unpack[Look]) -> Axes:
             angle = middle + FAN * (slot - (len(around) - 1) / 2)
             _draw_loop(ax, edge, where[mode], np.radians(angle))
     _frame(ax, np.array(list(where.values())), bool(loops))
-    ax.text(
-        0.5,
-        0.0,
-        _key(system),
-        transform=ax.transAxes,
-        ha="center",
-        va="top",
-        fontsize=small_text(),
-        color="0.35",
-    )
+    _write_key(ax, system)
+    moved = [label.text for label in labels]
+    # Arrows are texts without letters.
+    fixed = [each for each in ax.texts if each.get_text() and each not in moved]
+    lay_out(ax)
+    keep_inside(ax, [each for each in fixed if isinstance(each, Annotation)])
+    keep_apart(ax, labels, fixed)
     return ax
 
 
@@ -147,7 +150,7 @@ class _Edge:
     @property
     def style(self) -> dict[str, Any]:
         """Properties of the arrow."""
-        found: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 13, "linewidth": 1.2}
+        found: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 13, "linewidth": line_width(1.2)}
         if self.is_limit:
             return {**found, "color": "0.5", "linestyle": (0, (6, 2, 1, 2))}
         plain = self.transition.reset is None
@@ -212,8 +215,14 @@ def _key(system: HybridSystem) -> str:
 
 
 def _draw_mode(ax: Axes, mode: str, place: np.ndarray, colour: str) -> Any:
-    style = {"boxstyle": "round,pad=0.6,rounding_size=0.9", "fc": "white", "ec": colour, "lw": 1.8}
-    text = ax.text(place[0], place[1], mode, ha="center", va="center", fontsize=12, zorder=4, bbox=style)
+    style = {
+        "boxstyle": "round,pad=0.6,rounding_size=0.9",
+        "fc": "white",
+        "ec": colour,
+        "lw": line_width(1.8),
+    }
+    size = text_size(OF_MODES)
+    text = ax.text(place[0], place[1], mode, ha="center", va="center", fontsize=size, zorder=4, bbox=style)
     return text.get_bbox_patch()
 
 
@@ -222,16 +231,10 @@ def _draw_end(ax: Axes, place: np.ndarray) -> Any:
     return ax.text(place[0], place[1], " ", ha="center", va="center", zorder=4, bbox=style).get_bbox_patch()
 
 
-def _draw_edge(
-    ax: Axes,
-    label: str,
-    arrow: dict[str, Any],
-    places: Sequence[np.ndarray],
-    bend: float,
-    along: float,
-    boxes: Sequence[Any],
-) -> None:
-    """A bent arrow between two boxes, with its label at the fraction ``along`` of its Bezier curve."""
+def _draw_arrow(
+    ax: Axes, arrow: dict[str, Any], places: Sequence[np.ndarray], bend: float, boxes: Sequence[Any]
+) -> np.ndarray:
+    """A bent arrow between two boxes; return its Bezier curve ``(3, 2)``."""
     start, end = places
     style = {
         **arrow,
@@ -244,8 +247,18 @@ def _draw_edge(
     ax.annotate("", xy=tuple(end), xytext=tuple(start), arrowprops=style, zorder=2)
     across = end - start
     control = (start + end) / 2 + bend * np.array([across[1], -across[0]])
-    middle = (1 - along) ** 2 * start + 2 * along * (1 - along) * control + along**2 * end
-    ax.text(middle[0], middle[1], label, ha="center", va="center", zorder=3, **LABEL)
+    return np.array([start, control, end])
+
+
+def _label_style() -> dict[str, Any]:
+    return {"fontsize": text_size(OF_EDGES), "bbox": LABEL_BOX}
+
+
+def _write_key(ax: Axes, system: HybridSystem) -> None:
+    """Say below the graph what its signs mean, in as many lines as it takes."""
+    style: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": small_text(), "color": "0.35"}
+    text = ax.text(0.5, 0.0, _key(system), transform=ax.transAxes, **style)
+    text.set_text(wrapped(text.get_text(), text.get_window_extent().width, room(ax)))
 
 
 def _draw_loop(ax: Axes, edge: _Edge, place: np.ndarray, angle: float) -> None:
@@ -256,15 +269,15 @@ def _draw_loop(ax: Axes, edge: _Edge, place: np.ndarray, angle: float) -> None:
 
     out, side = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
     # Distance at which a ray leaves the box, whose width follows from the name and its margins.
-    foot = (
-        min((3.6 * len(edge.transition.source) + 9) / max(abs(out[0]), 1e-9), 15 / max(abs(out[1]), 1e-9)) + 2
-    )
-    far = foot + 46
+    scale = text_size(OF_MODES) / OF_MODES
+    beside, above = 3.6 * len(edge.transition.source) + 9, 15
+    foot = scale * (min(beside / max(abs(out[0]), 1e-9), above / max(abs(out[1]), 1e-9)) + 2)
+    far = foot + scale * 46
     vertices = [
-        (foot - 4) * out - 8 * side,
-        far * out - 34 * side,
-        far * out + 34 * side,
-        foot * out + 8 * side,
+        (foot - 4) * out - scale * 8 * side,
+        far * out - scale * 34 * side,
+        far * out + scale * 34 * side,
+        foot * out + scale * 8 * side,
     ]
     path = Path(vertices, [Path.MOVETO, Path.CURVE4, Path.CURVE4, Path.CURVE4])
     figure = ax.get_figure(root=True)
@@ -281,17 +294,18 @@ def _draw_loop(ax: Axes, edge: _Edge, place: np.ndarray, angle: float) -> None:
         ha="center" if abs(out[0]) < 0.4 else ("left" if out[0] > 0 else "right"),
         va="center" if abs(out[1]) < 0.4 else ("bottom" if out[1] > 0 else "top"),
         zorder=3,
-        **LABEL,
-    )
+        **_label_style(),
+    ).set_in_layout(False)
 
 
 def _frame(ax: Axes, places: np.ndarray, loops: bool) -> None:
     """Set limits with room for labels and loops, and hide the axes."""
     low, high = places.min(axis=0), places.max(axis=0)
     row = high[1] - low[1] < 1e-9
-    beside = 0.7 if len(places) < CROWD else 0.4
+    beside = 0.7 if len(places) <= 2 or (loops and len(places) < CROWD) else 0.4
     ax.set_xlim(low[0] - beside, high[0] + beside)
-    margin = 0.65 if loops or len(places) < CROWD else 0.2
-    ax.set_ylim(low[1] - margin, high[1] + margin + (0.35 if loops and row else 0.0))
+    margin = 0.65 if loops or len(places) <= 2 else 0.25
+    # The key is below the graph.
+    ax.set_ylim(low[1] - max(margin, FOR_KEY), high[1] + margin + (0.35 if loops and row else 0.0))
     ax.set_aspect("equal", adjustable="box")
     ax.set_axis_off()

@@ -10,6 +10,7 @@ from hybrid import arguments
 from hybrid.plot.axes import (
     Rows,
     axes_for,
+    logarithmic,
     mark,
     plain,
 )
@@ -161,7 +162,7 @@ def plot_global_error(result: ErrorBounds, **look: Unpack[Look]) -> Rows:
         axes[1].set_xlabel(label_of("t", system.units.get("t")))
         axes[1].set_ylabel(label_of("error of jump times", system.units.get("t")))
     for row in axes:
-        row.set_yscale("log")
+        logarithmic(row, "y")
         row.grid(True, axis="y", color="0.9")
         plain(row)
     return axes

@@ -43,7 +43,7 @@ def legend_above(
     ax: Axes, handles: Sequence[Any], *, side: str, most: int = MOST_COLUMNS, fontsize: float | None = None
 ) -> None:
     """A legend above the axes with as many columns, up to ``most``, as fit into the picture."""
-    width = room(ax)
+    width = room(ax, side)
     for columns in range(max(min(len(handles), most), 1), 0, -1):
         made = ax.legend(
             handles=handles,
@@ -75,12 +75,17 @@ def wrapped(text: str, width: float, free: float) -> str:
     return textwrap.fill(text, max(int(len(text) * free / width), 8), break_long_words=False)
 
 
-def room(ax: Axes) -> float:
-    """The width in pixels that texts beside the axes may take: that of the axes' column of the figure."""
+def room(ax: Axes, side: str = "right") -> float:
+    """The width in pixels that texts beside the axes may take: that of the axes' column of the figure.
+
+    A text that begins at the left end of the axes must leave the labels of the ordinate free.
+    """
     whole = ax.figure.bbox.width
     place = ax.get_subplotspec()
     share = 1.0 if place is None else len(place.colspan) / place.get_gridspec().ncols
-    return float(whole * share - BESIDE * ax.figure.dpi / 72)
+    free = whole * share - BESIDE * ax.figure.dpi / 72
+    labels = ax.yaxis.get_tightbbox() if side == "left" else None
+    return float(free if labels is None else free - labels.width)
 
 
 def title_above(ax: Axes, text: str) -> None:
@@ -89,7 +94,7 @@ def title_above(ax: Axes, text: str) -> None:
     if made is not None:
         pad += made.get_window_extent().height * 72 / ax.figure.dpi
     title = ax.set_title(text, loc="left", fontsize=small_text(), pad=pad)
-    title.set_text(wrapped(text, title.get_window_extent().width, room(ax)))
+    title.set_text(wrapped(text, title.get_window_extent().width, room(ax, "left")))
 
 
 def member_legend(ax: Axes, names: Sequence[str], colours: Sequence[Any]) -> None:

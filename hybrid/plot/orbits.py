@@ -19,6 +19,7 @@ from hybrid.plot.axes import (
     dot_area,
     named_quantity,
     plain,
+    show_spread,
 )
 from hybrid.plot.labels import label_of
 from hybrid.plot.legends import legend, title_above
@@ -81,6 +82,7 @@ def plot_section(
     across_name, up_name = ("t", first) if other is None else (first, other)
     ax.set_xlabel(label_of(across_name, system.units.get(across_name)))
     ax.set_ylabel(label_of(up_name, system.units.get(up_name)))
+    show_spread(ax, across, up)
     plain(ax)
     legend(ax, modes, visited)
     return ax

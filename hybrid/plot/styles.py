@@ -20,8 +20,8 @@ PRINTED = ("#08306B", "#D55E00", "#56B4E9", "#000000", "#B08A00", "#A3195B", "#8
 INK = "#333333"
 # Size in points of texts beside a picture, such as those of a legend, where the font is no smaller.
 SMALL_TEXT = 8.0
-# What Matplotlib takes by default for the width of lines and the diameter of markers, in points.
-USUAL_LINE, USUAL_MARKER = 1.5, 6.0
+# What Matplotlib takes by default for the width of lines, the diameter of markers and letters, in points.
+USUAL_LINE, USUAL_MARKER, USUAL_FONT = 1.5, 6.0, 10.0
 # Pictures that become narrower keep more of their height than of their width: texts do not shrink as they do.
 KEPT_HEIGHT = 0.7
 
@@ -185,6 +185,12 @@ def line_width(usual: float) -> float:
 def dot_size(usual: float) -> float:
     """The diameter of a marker, in points, that is ``usual`` with the usual settings of Matplotlib."""
     return usual * _setting("lines.markersize") / USUAL_MARKER
+
+
+def text_size(usual: float) -> float:
+    """The size of a text in points that is ``usual`` with the usual font; with small fonts all are alike."""
+    size = _setting("font.size")
+    return usual * size / USUAL_FONT if size >= USUAL_FONT else min(usual, size)
 
 
 def small_text() -> float:

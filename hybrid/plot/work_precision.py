@@ -10,6 +10,7 @@ import numpy as np
 from hybrid import arguments
 from hybrid.plot.axes import (
     axes_for,
+    logarithmic,
     plain,
 )
 from hybrid.plot.picture import Look, picture
@@ -120,6 +121,8 @@ def _label_ends(ax: Axes, ends: list[tuple[float, float, str, str]]) -> None:
     figure = ax.get_figure(root=True)
     assert figure is not None
     # The limits must be set before the layout: it would shift the points that the labels refer to.
+    for axis in ("x", "y"):
+        logarithmic(ax, axis)
     low, high = ax.get_xlim()
     ax.set_xlim(low, high * (high / low) ** 0.45)
     figure.draw_without_rendering()

@@ -139,7 +139,7 @@ def public_functions():
         found += [getattr(module, name) for name in module.__all__]
     plots = [each for name, each in vars(lyapunov.plot).items() if name.startswith("plot_")]
     assert len(plots) == 10
-    found += [*plots, lyapunov.plot.style, lyapunov.study.regimes.plot_regimes]
+    found += [*plots, hybrid.plot.style, lyapunov.study.regimes.plot_regimes]
     found += [getattr(hybrid.plot, name) for name in hybrid.plot.__all__ if name.startswith("plot")]
     found += [each for name, each in vars(models).items() if inspect.isfunction(each)]
     laws = (contact.Rigid, contact.Hertz, contact.HuntCrossley, contact.KelvinVoigt)

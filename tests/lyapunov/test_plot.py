@@ -298,7 +298,7 @@ class TestPhasePortrait:
     def test_a_fixed_point_is_a_large_dot(self, spread):
         arc = hybrid.simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 0.1))
         section = np.array([[0.0, 0.0], [0.0, spread]])
-        ax = plot_phase_portrait(arc, "q", "v", section=section, labels=("a", "b"))
+        ax = plot_phase_portrait(arc, "q", "v", section=section, labels={"q": "a", "v": "b"})
         [dots] = ax.collections
         np.testing.assert_array_equal(dots.get_offsets(), section)
         assert (dots.get_sizes()[0] > 10.0) == (spread < 1e-6)

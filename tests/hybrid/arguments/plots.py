@@ -22,7 +22,11 @@ from tests.hybrid.arguments.values import (
 )
 
 SIZE = [value for value in POSITIVE if value is not None]
+SYMBOLS = [3, "a", ["a"], {1: "a"}, {"q": 1}, {"no such name": "a"}]
+STYLES = ["nope", 3, True, "Paper"]
 FIGSIZE = [3, "a", (1.0,), (1.0, -2.0), (1.0, np.inf), ("a", "b")]
+
+LOOK = {"ax": AXES, "figsize": FIGSIZE, "labels": SYMBOLS, "style": STYLES}
 
 
 def plots(made):
@@ -38,8 +42,7 @@ def plots(made):
             {
                 "arc": [None, "a", 3, BALL],
                 "components": [["nope"], "nope", 3, [2], [1.5], [None], [True]],
-                "ax": AXES,
-                "figsize": FIGSIZE,
+                **LOOK,
             },
         ),
         (
@@ -48,15 +51,14 @@ def plots(made):
                 "arc": [None, "a", 3, BALL],
                 "x": COMPONENT,
                 "y": COMPONENT,
-                "ax": AXES,
-                "figsize": FIGSIZE,
+                **LOOK,
             },
         ),
         (
             call(hybrid.plot.plot_contacts, touching),
-            {"arc": [None, "a", 3, BALL], "ax": AXES, "figsize": FIGSIZE},
+            {"arc": [None, "a", 3, BALL], **LOOK},
         ),
-        (call(hybrid.plot.plot_graph, BALL), {"system": SYSTEM, "ax": AXES, "figsize": FIGSIZE}),
+        (call(hybrid.plot.plot_graph, BALL), {"system": SYSTEM, **LOOK}),
         (call(hybrid.plot.plot, BALL), {"result": [None, "a", 3]}),
         (
             call(hybrid.plot.plot_section, made["section"]),
@@ -65,13 +67,12 @@ def plots(made):
                 "section": [None, "a", 3, arc],
                 "x": COMPONENT,
                 "y": COMPONENT,
-                "ax": AXES,
-                "figsize": FIGSIZE,
+                **LOOK,
             },
         ),
         (
             call(hybrid.plot.plot_orbit, made["orbit"]),
-            {"orbit": [None, "a", 3, arc], "x": COMPONENT, "y": COMPONENT, "ax": AXES, "figsize": FIGSIZE},
+            {"orbit": [None, "a", 3, arc], "x": COMPONENT, "y": COMPONENT, **LOOK},
         ),
         (
             call(hybrid.plot.plot_branch, made["branch"]),
@@ -80,13 +81,12 @@ def plots(made):
                 "y": COMPONENT,
                 "over": AXES[1:],
                 "label": [3, True, [3], ["a", "b"], {}],
-                "ax": AXES,
-                "figsize": FIGSIZE,
+                **LOOK,
             },
         ),
         (
             call(hybrid.plot.plot_curve, made["curve"]),
-            {"curve": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE},
+            {"curve": [None, "a", 3, arc], **LOOK},
         ),
         (
             call(hybrid.plot.plot_diagram, made["diagram"]),
@@ -95,24 +95,21 @@ def plots(made):
                 # The model has three components.
                 "y": [each for each in COMPONENT if type(each) is not int or not -4 < each < 3],
                 "over": AXES[1:],
-                "ax": AXES,
-                "figsize": FIGSIZE,
+                **LOOK,
             },
         ),
         (
             call(hybrid.plot.plot_work_precision, made["work"]),
             {
                 "result": [None, "a", 3, BALL],
-                "ax": AXES,
-                "figsize": FIGSIZE,
+                **LOOK,
                 "quantity": [None, *NAME],
             },
         ),
         (
             call(lyapunov.plot.plot_convergence, {"a": [1.0, 2.0]}),
             {
-                "ax": AXES,
-                "figsize": FIGSIZE,
+                **LOOK,
                 "estimates": [[1], "a", {"a": "b"}, {"a": 1.0}, {"a": [[1.0]]}, {"a": [True]}],
                 "points": [[1], "a", {"a": 1.0}, {"a": ([1.0], [1.0, 2.0])}, {"a": ("a", "b")}],
                 "points_label": TEXT,
@@ -124,14 +121,12 @@ def plots(made):
         (
             call(lyapunov.plot.plot_phase_portrait, arc, "q", "v"),
             {
-                "ax": AXES,
-                "figsize": FIGSIZE,
+                **LOOK,
                 "arc": [None, "a", 3, BALL],
                 "x": COMPONENT,
                 "y": COMPONENT,
                 "size": SIZE,
                 "section": ["a", [1.0], [[True, False]], [["a", "b"]], 3.0],
-                "labels": LABELS,
             },
         ),
         (
@@ -150,27 +145,25 @@ def plots(made):
         ),
         (
             call(lyapunov.plot.plot_exponents, chart),
-            {"size": SIZE, "ax": AXES, "figsize": FIGSIZE, "chart": [None, "a", 3, arc]},
+            {"size": SIZE, **LOOK, "chart": [None, "a", 3, arc]},
         ),
         (
             call(lyapunov.plot.plot_bifurcation, chart),
             {
                 "size": SIZE,
-                "ax": AXES,
-                "figsize": FIGSIZE,
+                **LOOK,
                 "chart": [None, "a", 3, arc],
                 "component": COMPONENT,
             },
         ),
         (
             call(lyapunov.plot.plot_kinds, chart),
-            {"ax": AXES, "figsize": FIGSIZE, "chart": [None, "a", 3, arc, chart]},
+            {**LOOK, "chart": [None, "a", 3, arc, chart]},
         ),
         (
             call(lyapunov.plot.plot_map, chart),
             {
-                "ax": AXES,
-                "figsize": FIGSIZE,
+                **LOOK,
                 "chart": [None, "a", 3, arc],
                 "exponent": [1, *COUNT],
             },
@@ -179,54 +172,52 @@ def plots(made):
             call(lyapunov.plot.plot_chart, chart),
             {
                 "size": SIZE,
-                "ax": AXES,
-                "figsize": FIGSIZE,
+                **LOOK,
                 "chart": [None, "a", 3, arc],
                 "component": COMPONENT,
             },
         ),
         (
             call(lyapunov.plot.plot_spectrum, made["spectrum"]),
-            {"spectrum": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE},
+            {"spectrum": [None, "a", 3, arc], **LOOK},
         ),
-        (call(lyapunov.plot.style), {}),
+        (call(hybrid.plot.style), {"name": STYLES, "labels": SYMBOLS[:-1]}),
         (
             call(hybrid.plot.plot_ends, made["ends"]),
             {
                 "ends": [None, "a", 3, arc],
                 "x": COMPONENT,
                 "y": COMPONENT,
-                "ax": AXES,
-                "figsize": FIGSIZE,
+                **LOOK,
                 "size": SIZE,
             },
         ),
         (
             call(hybrid.plot.plot_basins, made["basins"]),
-            {"basins": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE, "size": SIZE},
+            {"basins": [None, "a", 3, arc], **LOOK, "size": SIZE},
         ),
         (
             call(hybrid.plot.plot_fractions, made["fractions"]),
-            {"fractions": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE},
+            {"fractions": [None, "a", 3, arc], **LOOK},
         ),
         (
             call(hybrid.plot.plot_sweep, made["swept"]),
-            {"swept": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE, "size": SIZE},
+            {"swept": [None, "a", 3, arc], **LOOK, "size": SIZE},
         ),
         (
             call(hybrid.plot.plot_jumps, arc.jumps),
-            {"jumps": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE},
+            {"jumps": [None, "a", 3, arc], **LOOK},
         ),
         (
             call(hybrid.plot.plot_global_error, made["error"]),
-            {"result": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE},
+            {"result": [None, "a", 3, arc], **LOOK},
         ),
         (
             call(lyapunov.plot.plot_two_orbits, made["two"]),
-            {"result": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE},
+            {"result": [None, "a", 3, arc], **LOOK},
         ),
         (
             call(lyapunov.plot.plot_comparison, made["comparison"]),
-            {"result": [None, "a", 3, arc], "ax": AXES, "figsize": FIGSIZE},
+            {"result": [None, "a", 3, arc], **LOOK},
         ),
     ]

@@ -22,11 +22,14 @@ def shown(figure):
     hidden = set()
     for ax in figure.findobj(lambda each: hasattr(each, "xaxis")):
         for axis in (ax.xaxis, ax.yaxis):
-            low, high = sorted(axis.get_view_interval())
+            scale = axis.get_transform().transform
+            low, high = sorted(scale(axis.get_view_interval()))
             margin = 1e-9 * (high - low)
             ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
             out = [
-                tick for tick in ticks if not low - margin <= tick.get_loc() <= high + margin or not ax.axison
+                tick
+                for tick in ticks
+                if not low - margin <= scale(tick.get_loc()) <= high + margin or not ax.axison
             ]
             hidden.update(text for tick in out for text in (tick.label1, tick.label2))
             if not ax.axison:

@@ -9,7 +9,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 from hybrid import ArgumentError
-from hybrid.plot.axes import as_component, axes_for, dot_area, plain
+from hybrid.plot.axes import as_component, axes_for, dot_area, logarithmic, plain, show_spread
 from hybrid.plot.legends import legend
 from hybrid.plot.styles import COLOURS, colour_of
 
@@ -33,7 +33,7 @@ def test_components_that_do_not_exist(component):
 
 def test_new_axes_are_in_a_column_and_share_their_time():
     for count in (1, 3):
-        axes = axes_for(None, count)
+        axes = axes_for({}, count)
         assert axes.shape == (count,)
         figure = axes[0].get_figure()
         assert figure.axes == axes.tolist()
@@ -42,17 +42,17 @@ def test_new_axes_are_in_a_column_and_share_their_time():
         assert tops == [*range(count)]
         axes[0].set_xlim(3.0, 4.0)
         assert axes[-1].get_xlim() == (3.0, 4.0)
-    assert tuple(axes_for(None, 1, (5.0, 2.0))[0].get_figure().get_size_inches()) == (5.0, 2.0)
+    assert tuple(axes_for({}, 1, (5.0, 2.0))[0].get_figure().get_size_inches()) == (5.0, 2.0)
 
 
 def test_given_axes_are_taken():
     _, grid = plt.subplots(2, 2)
-    assert axes_for(grid, 4).tolist() == grid.ravel().tolist()
-    assert axes_for(grid[0, 0], 1).tolist() == [grid[0, 0]]
+    assert axes_for({"ax": grid}, 4).tolist() == grid.ravel().tolist()
+    assert axes_for({"ax": grid[0, 0]}, 1).tolist() == [grid[0, 0]]
     with pytest.raises(ArgumentError, match="ax must hold 3 axes, one per row of the picture; got 4"):
-        axes_for(grid, 3)
+        axes_for({"ax": grid}, 3)
     with pytest.raises(ArgumentError, match="ax"):
-        axes_for([grid[0, 0], 3], 2)
+        axes_for({"ax": [grid[0, 0], 3]}, 2)
 
 
 def test_colours_repeat_after_the_last():
@@ -84,6 +84,39 @@ def test_the_frame_is_open():
     }
 
 
-def test_dots_share_an_area_within_limits():
-    assert [dot_area(count) for count in (0, 1, 200, 400, 4000, 10_000)] == [20.0, 20.0, 20.0, 10.0, 1.0, 1.0]
-    assert dot_area(10_000, 3.0) == 9.0
+def test_dots_are_smaller_the_more_there_are_and_can_always_be_seen():
+    areas = [dot_area(np.arange(count), np.arange(count)) for count in (0, 1, 250)]
+    assert areas == [20.0, 20.0, 20.0]
+    generator = np.random.default_rng(0)
+    clouds = [dot_area(*generator.uniform(size=(2, count))) for count in (400, 2000, 100_000)]
+    assert clouds == [pytest.approx(15.0, rel=0.01), pytest.approx(3.0, rel=0.02), 1.5]
+    assert dot_area(np.zeros(10_000), np.zeros(10_000), 3.0) == 9.0
+
+
+def test_points_on_each_other_are_one_dot():
+    """A thousand periods of a few attractors are few dots, and what is no number is none."""
+    few, many = np.repeat([0.0, 1.0, 2.0], 1000), np.repeat([1.0, 1.0 + 1e-9, 5.0], 1000)
+    assert dot_area(few, many) == dot_area(few[::1000], many[::1000]) == 20.0
+    assert dot_area([np.nan, 1.0], [1.0, np.inf]) == 20.0
+
+
+def test_points_that_differ_by_rounding_have_the_picture_of_one_point():
+    _, ax = plt.subplots()
+    across, up = 3.0 + 1e-15 * np.arange(4), np.array([0.0, 1.0, 2.0, np.nan])
+    ax.plot(across, up)
+    before = ax.get_ylim()
+    show_spread(ax, across, up)
+    assert ax.get_xlim() == pytest.approx((2.85, 3.15))
+    assert ax.get_ylim() == before
+
+
+@pytest.mark.parametrize("ends", [(2e-6, 3e-6), (3e-6, 4e-5), (1.0, 1e8)])
+def test_a_logarithmic_scale_shows_two_powers_of_ten_at_least(ends):
+    _, ax = plt.subplots()
+    ax.plot([0.0, 1.0], ends)
+    logarithmic(ax, "y")
+    low, high = ax.get_ylim()
+    assert low <= ends[0] < ends[1] <= high
+    assert np.floor(np.log10(high) + 1e-9) - np.ceil(np.log10(low) - 1e-9) >= 1
+    ax.get_figure().draw_without_rendering()
+    assert not any(text.get_text() for text in ax.get_yticklabels(minor=True))

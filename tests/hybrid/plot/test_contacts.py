@@ -12,6 +12,7 @@ import models
 from hybrid import ArgumentError, simulate
 from hybrid.plot import plot, plot_arc, plot_contacts
 from hybrid.plot.contacts import IMPACT_COLOUR, STATES
+from hybrid.plot.styles import colour_of
 from tests.hybrid.transform.contacts.scenes import G, beam, block
 
 
@@ -40,9 +41,9 @@ def bands(ax):
 
 def test_slip_and_stick_are_bands_that_meet_where_the_block_stops(sliding):
     found, stop = bands(plot_contacts(sliding)), 2.0 / (0.3 * G)
-    [(begin, end, height)] = found[STATES["slips +"].lower()]
+    [(begin, end, height)] = found[colour_of(STATES["slips +"]).lower()]
     assert (begin, end, height) == pytest.approx((0.0, stop, 0.0), abs=1e-9)
-    [(begin, end, height)] = found[STATES["sticks"].lower()]
+    [(begin, end, height)] = found[colour_of(STATES["sticks"]).lower()]
     assert (begin, end, height) == pytest.approx((stop, 1.5, 0.0), abs=1e-9)
 
 
@@ -65,7 +66,7 @@ def test_an_arc_has_a_row_of_contacts_below_its_components():
     assert len(axes) == 5
     assert [each.get_text() for each in axes[-1].get_yticklabels()] == ["left", "right"]
     assert len(plot_arc(arc, ["y", "left.normal"])) == 2
-    held = bands(axes[-1])[STATES["held"].lower()]
+    held = bands(axes[-1])[colour_of(STATES["held"]).lower()]
     firsts = np.flatnonzero(np.diff(arc.j, prepend=-1))
     lengths = np.diff(np.append(arc.t[firsts], arc.t[-1]))
     for k, name in enumerate(("left", "right")):

@@ -193,12 +193,11 @@ def test_everything_is_inside_of_the_frame(names, loops):
     (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
     places = np.array([*modes(ax).values()])
     (x0, y0), (x1, y1) = places.min(axis=0), places.max(axis=0)
-    crowd = len(names) >= 5
-    margin = 0.65 if loops or not crowd else 0.2
+    margin = 0.65 if loops or len(names) < 3 else 0.25
     # Loops of modes in a row are above them.
     above = margin + 0.35 * (loops and len(names) < 3)
-    np.testing.assert_allclose([y0 - low, high - y1], [margin, above])
-    np.testing.assert_allclose([x0 - left, right - x1], 0.4 if crowd else 0.7)
+    np.testing.assert_allclose([y0 - low, high - y1], [max(margin, 0.5), above])
+    np.testing.assert_allclose([x0 - left, right - x1], 0.7 if len(names) < (5 if loops else 3) else 0.4)
     assert not ax.axison
     assert ax.get_aspect() == 1.0
     figure.draw_without_rendering()

@@ -286,9 +286,6 @@ def test_axes_and_sizes_come_last_and_by_keyword():
             if name.startswith("plot_") and "ax" in inspect.signature(function).parameters:
                 options = list(inspect.signature(function).parameters.values())
                 first = [option.name for option in options].index("ax")
-                assert [option.name for option in options[first:]] in (
-                    ["ax", "figsize"],
-                    ["ax", "figsize", "size"],
-                )
+                assert [option.name for option in options[first:]] == ["ax", "figsize", "labels", "style"]
                 for option in options[first:]:
                     assert (option.kind, option.default) == (inspect.Parameter.KEYWORD_ONLY, None)
