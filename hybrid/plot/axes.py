@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from hybrid import arguments
 from hybrid.errors import ArgumentError
 from hybrid.plot.picture import Look
-from hybrid.plot.styles import USUAL_MARKER, current, dot_size
+from hybrid.plot.styles import USUAL_FONT, USUAL_MARKER, current, dot_size, text_size
 from hybrid.simulation.quantities import words_for
 from hybrid.status import StatusCode
 from hybrid.system.graph import HybridSystem
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+# Widths of ticks with their labels, in heights of letters, and of axes in widths of the figure.
+POINTS_OF_INCH, WIDTH_OF_TICK, SHARE_OF_AXES, MOST_TICKS = 72, 4.5, 0.85, 9
 # Diameter in points of a dot that fills a page.
 LARGEST_DOT = 1000.0
 # Areas of dots in square points: the least that is seen, that of a few dots, and of all dots together.
@@ -101,6 +103,8 @@ def axes_for(
         size = figsize or current().size(default or (7.0, 0.8 + 1.5 * count))
         options: dict[str, Any] = {"figsize": size, "layout": "constrained", **_kept_style()}
         _, made = plt.subplots(count, 1, sharex=shared, squeeze=False, **options)
+        for each in made[:, 0]:
+            _set_ticks(each, size[0])
         return made[:, 0].view(Rows)
     try:
         axes = np.atleast_1d(np.array(ax, dtype=object)).ravel()
@@ -111,6 +115,14 @@ def axes_for(
     if len(axes) != count:
         raise ArgumentError(f"ax must hold {count} axes, one per row of the picture; got {len(axes)}.")
     return axes.view(Rows)
+
+
+def _set_ticks(ax: Axes, width: float) -> None:
+    """At most so many ticks on the abscissa that numbers of six characters are apart, ``width`` in inches."""
+    from matplotlib.ticker import MaxNLocator
+
+    most = int(POINTS_OF_INCH * width * SHARE_OF_AXES / (WIDTH_OF_TICK * text_size(USUAL_FONT)))
+    ax.xaxis.set_major_locator(MaxNLocator(min(max(most, 2), MOST_TICKS), steps=[1, 2, 2.5, 5, 10]))
 
 
 def _kept_style() -> dict[str, Any]:

@@ -295,7 +295,7 @@ def _draw_loop(ax: Axes, edge: _Edge, place: np.ndarray, angle: float) -> None:
         va="center" if abs(out[1]) < 0.4 else ("bottom" if out[1] > 0 else "top"),
         zorder=3,
         **_label_style(),
-    ).set_in_layout(False)
+    )
 
 
 def _frame(ax: Axes, places: np.ndarray, loops: bool) -> None:

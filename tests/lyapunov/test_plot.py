@@ -302,7 +302,7 @@ class TestPhasePortrait:
         [dots] = ax.collections
         np.testing.assert_array_equal(dots.get_offsets(), section)
         assert (dots.get_sizes()[0] > 10.0) == (spread < 1e-6)
-        assert (ax.get_xlabel(), ax.get_ylabel()) == ("a", "b")
+        assert (ax.get_xlabel(), ax.get_ylabel()) == ("a (m)", "b (m/s)")
 
     def test_an_output_in_the_plane_and_at_a_section(self):
         ball = models.bouncing_ball()
