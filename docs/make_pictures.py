@@ -13,6 +13,7 @@ mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 import numpy as np
+import print_plots
 
 import models
 from hybrid import (
@@ -213,6 +214,7 @@ def main() -> None:
         branch_picture(folder)
         equilibria_picture(folder)
         diagram_picture(folder)
+        print_plots.write(folder, save)
 
 
 if __name__ == "__main__":

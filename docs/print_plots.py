@@ -20,6 +20,10 @@ from models.contact import Hertz, Rigid, hertz_stiffness
 
 HERE = Path(__file__).parent
 PAGE, FOLDER = HERE / "plots.md", "plots"
+# The impact oscillator with a stop in the middle, where its motion is chaotic.
+CHAOS = {"d": 0.0, "c": 0.05, "w": 2.8}
+START = (-0.5, 0.0)
+FAST = DOP853(rtol=1e-7, atol=1e-9)
 # The text before the pictures is written by hand and ends with this line.
 BEGIN = "## Each plot as it is printed"
 
@@ -65,7 +69,9 @@ def fold() -> Any:
 
 
 def section() -> Any:
-    return hybrid.stroboscopic_section(models.impact_oscillator(), (0.0, 0.0), periods=3000, parameters=CHAOS)
+    return hybrid.stroboscopic_section(
+        models.impact_oscillator(), START, periods=2000, transient=100, parameters=CHAOS, solver=FAST
+    )
 
 
 def ends() -> Any:
@@ -105,28 +111,37 @@ def work() -> Any:
 
 def spectrum() -> Any:
     return lyapunov.lyapunov_spectrum(
-        models.impact_oscillator(), (0.0, 0.0), k=2, intervals=500, parameters=CHAOS
+        models.impact_oscillator(), START, k=2, intervals=500, parameters=CHAOS, solver=FAST
     )
 
 
 def two() -> Any:
-    return lyapunov.two_orbit_exponents(
-        models.impact_oscillator(), (0.0, 0.0), intervals=300, parameters=CHAOS
-    )
+    return lyapunov.two_orbit_exponents(models.impact_oscillator(), START, intervals=300, parameters=CHAOS)
 
 
 def line() -> Any:
-    over = {"w": np.linspace(2.3, 3.0, 141)}
-    fast = DOP853(rtol=1e-7, atol=1e-9)
     return lyapunov.chart(
-        models.impact_oscillator(), over, (0.0, 0.0), k=2, intervals=200, section=100, solver=fast
+        models.impact_oscillator(),
+        {"w": np.linspace(2.6, 2.85, 101)},
+        START,
+        k=2,
+        intervals=200,
+        section=60,
+        solver=FAST,
+        parameters={"d": 0.0, "c": 0.05},
     )
 
 
 def plane() -> Any:
-    over = {"w": np.linspace(2.4, 3.0, 24), "r": np.linspace(0.6, 0.9, 24)}
-    fast = DOP853(rtol=1e-7, atol=1e-9)
-    return lyapunov.chart(models.impact_oscillator(), over, (0.0, 0.0), k=2, intervals=100, solver=fast)
+    return lyapunov.chart(
+        models.impact_oscillator(),
+        {"w": np.linspace(2.6, 2.85, 24), "c": np.linspace(0.05, 0.2, 24)},
+        START,
+        k=2,
+        intervals=150,
+        solver=FAST,
+        parameters={"d": 0.0},
+    )
 
 
 def compared() -> Any:
@@ -137,10 +152,9 @@ def compared() -> Any:
 
 
 def chaos() -> Any:
-    return simulate(models.impact_oscillator(), (0.0, 0.0), (0.0, 60.0), parameters=CHAOS)
+    return simulate(models.impact_oscillator(), START, (0.0, 60.0), parameters=CHAOS)
 
 
-CHAOS = {"w": 2.75}
 MAKE: dict[str, Callable[[], Any]] = {
     each.__name__: each
     for each in (

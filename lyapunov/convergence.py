@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from hybrid import ArgumentError, arguments
 from hybrid.plot.axes import (
     axes_for,
+    logarithmic,
     mark,
 )
 from hybrid.plot.labels import label_of
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
 MINUS_INFINITY = "minus infinity"
 POINTS_OF_A_LINE = 1500
+# What stays free behind the last estimate, as a factor, so that its bar is seen.
+LITTLE = 1.1
 FIGURE = (6.4, 3.8)
 
 
@@ -92,7 +95,7 @@ def plot_convergence(
         ax.set_xlim(1.0, 1.0 + max([1, *map(len, histories.values())]))
     if points:
         ax.plot([], [], "o", color=INK, markersize=dot_size(4.5), markerfacecolor="white", label=points_label)
-    ax.set_xscale("log")
+    logarithmic(ax, "x")
     ax.set_xlabel("intervals $M$")
     ax.set_ylabel(label_of("exponent estimate", unit))
     ax.grid(True, axis="y")
@@ -168,7 +171,13 @@ def _frame(ax: Axes, history: np.ndarray, least: list[float]) -> None:
     out = np.flatnonzero(((history < bottom) | (history > top)).any(axis=1))
     # The row i is the estimate after i + 1 intervals.
     first, last = (int(out[-1]) + 2 if len(out) else 1), max(len(history), 2)
-    ax.set_xlim(first, last * (last / first) ** 0.03)
+    for line in ax.lines:
+        x, y = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+        if len(x) == len(y) > 2:
+            line.set_data(x[x >= first], y[x >= first])
+    # Two powers of ten are shown.
+    left = 10.0 ** min(np.floor(np.log10(first)), np.floor(np.log10(last)) - 1)
+    ax.set_xlim(max(left, 1.0), last * LITTLE)
 
 
 @picture
