@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -23,7 +24,7 @@ ROUNDS, POINTS, OF_CURVES = 3, 41, 2.0
 NOWHERE = np.full((1, 2), -np.inf)
 
 
-@attrs.frozen
+@attrs.frozen(eq=False)
 class CurveLabel:
     """A label at the fraction ``along`` of a quadratic Bezier curve ``(3, 2)``, in data coordinates."""
 
@@ -51,7 +52,10 @@ def lay_out(ax: Axes) -> None:
     """Let the layout decide where the axes and their texts are."""
     figure = ax.get_figure(root=True)
     assert figure is not None
-    figure.draw_without_rendering()
+    with warnings.catch_warnings():
+        # A figure that is too small for a layout is drawn without one, as Matplotlib says when it is shown.
+        warnings.filterwarnings("ignore", "constrained_layout not applied", UserWarning)
+        figure.draw_without_rendering()
 
 
 def keep_inside(ax: Axes, notes: Iterable[Annotation]) -> None:
@@ -88,7 +92,7 @@ def keep_apart(ax: Axes, labels: Sequence[CurveLabel], fixed: Iterable[Text]) ->
             label.text.set_in_layout(False)
 
 
-@attrs.frozen
+@attrs.frozen(eq=False)
 class _Room:
     """What a label must not lie on, in pixels: boxes, and points ``(N, 2)`` of curves."""
 

@@ -23,7 +23,7 @@ from hybrid.plot.axes import (
     named_quantity,
 )
 from hybrid.plot.datasets import SECTION, column
-from hybrid.plot.labels import label_of
+from hybrid.plot.labels import is_text, label_of
 from hybrid.plot.legends import small_legend
 from hybrid.plot.picture import Look, picture
 from hybrid.plot.styles import colour_of, dot_size, line_width
@@ -169,8 +169,10 @@ def _labels_of(given: object, branches: Sequence[AnyBranch]) -> list[str | None]
     if given is None:
         return [None] * len(branches)
     found = [given] if isinstance(given, str) else arguments.items("label", given, "be a text per branch")
-    if len(found) != len(branches) or not all(isinstance(each, str) for each in found):
-        raise arguments.refusal("label", f"be a text per branch, of which there are {len(branches)}", given)
+    if len(found) != len(branches) or not all(is_text(each) for each in found):
+        raise arguments.refusal(
+            "label", f"be a printable text per branch, of which there are {len(branches)}", given
+        )
     return found
 
 

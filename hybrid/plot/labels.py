@@ -36,11 +36,16 @@ class Labels:
 _labels: ContextVar[Labels | None] = ContextVar("labels", default=None)
 
 
+def is_text(value: object) -> bool:
+    """Whether a value is a text that can be drawn."""
+    return isinstance(value, str) and value.replace("\n", "").isprintable()
+
+
 def as_labels(value: object) -> dict[str, str]:
     """A mapping of names to texts."""
-    wanted = "map names to texts"
+    wanted = "map names to texts of printable letters"
     found: dict[Any, Any] = arguments.mapping("labels", value, wanted)
-    if not all(isinstance(each, str) for pair in found.items() for each in pair):
+    if not all(isinstance(name, str) and is_text(said) for name, said in found.items()):
         raise arguments.refusal("labels", wanted, value)
     return found
 

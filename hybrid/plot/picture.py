@@ -11,9 +11,10 @@ from typing import Any, ParamSpec, TypedDict, TypeVar
 
 import numpy as np
 
+from hybrid import arguments
 from hybrid.errors import ArgumentError
 from hybrid.plot.labels import as_labels, labelled
-from hybrid.plot.styles import style
+from hybrid.plot.styles import STYLES, style
 
 Given = ParamSpec("Given")
 Drawn = TypeVar("Drawn")
@@ -59,14 +60,15 @@ def picture(function: Callable[Given, Drawn]) -> Callable[Given, Drawn]:
         name, labels = options.pop("style", None), options.pop("labels", None)
         if name is None and labels is None:
             return function(*args, **kwargs)
-        context = style(name)
+        if name is not None:
+            arguments.one_of("style", name, tuple(STYLES))
         if name is not None and options.get("ax") is not None:
             raise ArgumentError(
                 f"style must be left out where ax is given; got {name!r}. Make the axes and draw within "
                 f"'with hybrid.plot.style({name!r}):'."
             )
         with ExitStack() as stack:
-            stack.enter_context(context)
+            stack.enter_context(style(name))
             record = None if labels is None else stack.enter_context(labelled(as_labels(labels)))
             drawn = function(*args, **kwargs)
         try:

@@ -148,7 +148,7 @@ def style(
     ('$q$ (m)', 3.4)
     """
     if name is not None:
-        arguments.one_of("style", name, tuple(STYLES))
+        arguments.one_of("name", name, tuple(STYLES))
     return _styled(name, None if labels is None else as_labels(labels))
 
 

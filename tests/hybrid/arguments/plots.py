@@ -22,7 +22,7 @@ from tests.hybrid.arguments.values import (
 )
 
 SIZE = [value for value in POSITIVE if value is not None]
-SYMBOLS = [3, "a", ["a"], {1: "a"}, {"q": 1}, {"no such name": "a"}]
+SYMBOLS = [3, "a", ["a"], {1: "a"}, {"q": 1}]
 STYLES = ["nope", 3, True, "Paper"]
 FIGSIZE = [3, "a", (1.0,), (1.0, -2.0), (1.0, np.inf), ("a", "b")]
 
@@ -181,7 +181,7 @@ def plots(made):
             call(lyapunov.plot.plot_spectrum, made["spectrum"]),
             {"spectrum": [None, "a", 3, arc], **LOOK},
         ),
-        (call(hybrid.plot.style), {"name": STYLES, "labels": SYMBOLS[:-1]}),
+        (call(hybrid.plot.style), {"name": STYLES, "labels": SYMBOLS}),
         (
             call(hybrid.plot.plot_ends, made["ends"]),
             {

@@ -169,7 +169,7 @@ class TestPaper:
     def test_a_style_that_does_not_exist_is_refused(self, bounces):
         with pytest.raises(ArgumentError, match="style"):
             plot_phase(bounces, "q", "v", style="papper")
-        with pytest.raises(ArgumentError, match="style"):
+        with pytest.raises(ArgumentError, match="name"):
             style("papper")
 
     def test_colours_can_be_told_apart_in_grey(self):
