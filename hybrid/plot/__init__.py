@@ -1,4 +1,4 @@
-"""Plots: arcs over time, phase portraits, sections, orbits, mode graphs, work-precision diagrams.
+"""Plots: arcs over time, phase portraits, sections, orbits, mode graphs, work-precision diagrams, and styles.
 
 The module can be called: ``hybrid.plot(arc)`` is ``hybrid.plot.plot(arc)``.
 """
@@ -127,7 +127,8 @@ def plot(result: Any, **options: Any) -> Any:
     result
         What to draw.
     **options
-        Options of the function that draws the result, such as ``ax=``.
+        Options of the function that draws the result, such as ``y=``, and those of all plots: ``ax=``,
+        ``figsize=``, ``labels=`` and ``style=``.
 
     Returns
     -------

@@ -170,9 +170,8 @@ def _labels_of(given: object, branches: Sequence[AnyBranch]) -> list[str | None]
         return [None] * len(branches)
     found = [given] if isinstance(given, str) else arguments.items("label", given, "be a text per branch")
     if len(found) != len(branches) or not all(is_text(each) for each in found):
-        raise arguments.refusal(
-            "label", f"be a printable text per branch, of which there are {len(branches)}", given
-        )
+        wanted = f"be a text per branch, of which there are {len(branches)}, in printable letters"
+        raise arguments.refusal("label", wanted, given)
     return found
 
 

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 MOST_COLUMNS = 5
 # Largest number of members of a repeat that a legend lists.
 MOST_LISTED = 5
+# The least area of a dot in a legend, in square points.
+LEAST_AREA = 9.0
 # What stays free beside a legend that is as wide as the figure, and between a legend and a title, in points.
 BESIDE, BETWEEN = 12.0, 6.0
 
@@ -54,10 +56,20 @@ def legend_above(
             borderaxespad=0.2,
             fontsize=fontsize,
         )
+        _enlarge_dots(made)
         found = made.get_window_extent().width
         if found <= width:
             return
     _wrap(made, found - width, width)
+
+
+def _enlarge_dots(made: Legend) -> None:
+    """Dots of a legend are seen also where those of the cloud are small."""
+    from matplotlib.collections import PathCollection
+
+    for handle in made.legend_handles:
+        if isinstance(handle, PathCollection):
+            handle.set_sizes([max(LEAST_AREA, *handle.get_sizes())])
 
 
 def _wrap(made: Legend, excess: float, width: float) -> None:

@@ -395,3 +395,18 @@ def test_estimates_from_two_orbits_and_comparisons_are_drawn():
     )
     told = {text.get_text() for text in hybrid.plot.plot(compared).get_legend().get_texts()}
     assert told == {"stiff, the reference", "same: the same exponents"}
+
+
+def test_no_curve_of_a_spectrum_leaves_its_frame():
+    """The first estimates, which are far off, are left out; each exponent has one entry in the legend."""
+    spectrum = lyapunov.lyapunov_spectrum(models.impact_oscillator(), (0.0, 0.0), k=2, intervals=300)
+    ax = lyapunov.plot.plot_spectrum(spectrum)
+    (low, high), (left, right) = ax.get_ylim(), ax.get_xlim()
+    curves = [line for line in ax.lines if len(line.get_xdata()) > 2]
+    assert len(curves) == 2
+    for line in curves:
+        x, y = line.get_data()
+        assert low <= y.min() <= y.max() <= high
+        assert left <= x.min() < x.max() == 300 <= right
+        assert right >= 10 * left
+    assert len(ax.get_legend().get_texts()) == 3

@@ -10,8 +10,9 @@ import matplotlib.pyplot as plt
 
 from hybrid import ArgumentError
 from hybrid.plot.axes import as_component, axes_for, dot_area, logarithmic, plain, show_spread
-from hybrid.plot.legends import legend
+from hybrid.plot.legends import legend, small_legend
 from hybrid.plot.styles import COLOURS, colour_of
+from tests.hybrid.plot.legible import illegible
 
 
 @pytest.fixture(autouse=True)
@@ -120,3 +121,27 @@ def test_a_logarithmic_scale_shows_two_powers_of_ten_at_least(ends):
     assert np.floor(np.log10(high) + 1e-9) - np.ceil(np.log10(low) - 1e-9) >= 1
     ax.get_figure().draw_without_rendering()
     assert not any(text.get_text() for text in ax.get_yticklabels(minor=True))
+
+
+def test_dots_of_a_legend_are_seen_where_those_of_the_cloud_are_small():
+    _, ax = plt.subplots()
+    ax.scatter([1.0, 2.0], [1.0, 2.0], s=1.0, label="cloud")
+    ax.scatter([1.0, 2.0], [1.0, 2.0], s=25.0, label="few")
+    small_legend(ax)
+    assert [handle.get_sizes().tolist() for handle in ax.get_legend().legend_handles] == [[9.0], [25.0]]
+
+
+@pytest.mark.parametrize("width", [6.0, 3.0])
+def test_a_legend_is_no_wider_than_its_figure(width):
+    figure, ax = plt.subplots(figsize=(width, 3.0), layout="constrained")
+    for name in "abcdef":
+        ax.plot([0.0, 1.0], [0.0, 1.0], label=f"a name that is rather long for a legend, {name}")
+    small_legend(ax)
+    assert illegible(figure) == []
+
+
+def test_columns_of_one_figure_share_its_width():
+    figure, (left, right) = plt.subplots(1, 2, layout="constrained")
+    for ax in (left, right):
+        legend(ax, ["free flight of the body", "contact with the floor", "sticks"], range(3))
+    assert illegible(figure) == []

@@ -8,10 +8,13 @@ mpl.use("Agg")
 
 import matplotlib.pyplot as plt
 
+import models
 from hybrid import After, At, Every, Guard, HybridSystem, Mode, Reset, Transition, simulate
 from hybrid.plot import plot_graph, plot_jumps
+from hybrid.plot.apart import CurveLabel, keep_apart, lay_out, point_on
 from hybrid.plot.graph import FAN, SIZES
 from hybrid.plot.styles import COLOURS
+from tests.hybrid.plot.legible import illegible
 
 
 @pytest.fixture(autouse=True)
@@ -234,3 +237,25 @@ def test_the_label_of_a_clock_says_when_it_ticks():
     arc = simulate(clocked, (0.0,), (0.0, 3.0), mode="a")
     rows = plot_jumps(arc.jumps)
     assert [label.get_text() for label in rows.get_yticklabels()][:1] == ["tick (every T)"]
+
+
+@pytest.mark.parametrize("model", [models.stick_slip, models.boost_converter, models.chua_circuit])
+@pytest.mark.parametrize("chosen", [None, "paper"])
+def test_labels_of_edges_are_apart_and_on_the_figure(model, chosen):
+    assert illegible(plot_graph(model(), style=chosen).figure) == []
+
+
+def test_labels_that_need_not_move_stay():
+    """Of three arrows the third has no place of its own: its label alone is moved."""
+    figure, ax = plt.subplots()
+    ax.set(xlim=(-1.0, 2.0), ylim=(-1.0, 1.0))
+    flat = np.array([[0.0, 0.0], [0.5, 0.0], [1.0, 0.0]])
+    curves = [flat, flat + np.array([0.0, 0.5]), flat + np.array([0.0, 1e-3])]
+    labels = [CurveLabel(ax.text(*point_on(curve, 0.5), "a"), curve, 0.5) for curve in curves]
+    lay_out(ax)
+    keep_apart(ax, labels, [])
+    places = [label.text.get_position() for label in labels]
+    assert places[1] == pytest.approx((0.5, 0.5))
+    assert illegible(figure) == []
+    for (x, _), curve in zip(places, curves, strict=True):
+        assert curve[0, 0] < x < curve[2, 0]
