@@ -5,9 +5,9 @@ from __future__ import annotations
 import functools
 import inspect
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
-from typing import Any, ParamSpec, TypedDict, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypedDict, TypeVar
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from hybrid import arguments
 from hybrid.errors import ArgumentError
 from hybrid.plot.labels import as_labels, labelled
 from hybrid.plot.styles import STYLES, style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Given = ParamSpec("Given")
 Drawn = TypeVar("Drawn")
@@ -27,7 +30,7 @@ PARAMETERS = "Parameters\n----------\n"
 class Look(TypedDict, total=False):
     """The arguments that all plots share, ``DESCRIBED`` in their docstrings."""
 
-    ax: Any
+    ax: Axes | Iterable[Axes] | None
     figsize: tuple[float, float] | None
     labels: Mapping[str, str] | None
     style: str | None
@@ -83,8 +86,8 @@ def picture(function: Callable[Given, Drawn]) -> Callable[Given, Drawn]:
     signature = inspect.signature(function)
     own = [each for each in signature.parameters.values() if each.kind is not each.VAR_KEYWORD]
     shared = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
-        for name, annotation in Look.__annotations__.items()
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind.__forward_arg__)
+        for name, kind in Look.__annotations__.items()
     ]
     draw.__signature__ = signature.replace(parameters=[*own, *shared])  # type: ignore[attr-defined]
     draw.__doc__ = described(function.__doc__ or "", [each.name for each in (*own, *shared)])
