@@ -45,7 +45,6 @@ def legend_above(
     ax: Axes, handles: Sequence[Any], *, side: str, most: int = MOST_COLUMNS, fontsize: float | None = None
 ) -> None:
     """A legend above the axes with as many columns, up to ``most``, as fit into the picture."""
-    width = room(ax, side)
     for columns in range(max(min(len(handles), most), 1), 0, -1):
         made = ax.legend(
             handles=handles,
@@ -58,8 +57,10 @@ def legend_above(
         )
         _enlarge_dots(made)
         found = made.get_window_extent().width
-        if found <= width:
+        # The labels of the ordinate, which take long to measure, are no wider than half of the figure.
+        if found <= room(ax) / 2 or found <= room(ax, side):
             return
+    width = room(ax, side)
     _wrap(made, found - width, width)
 
 
