@@ -254,18 +254,21 @@ def check_impacts(case: Case) -> None:
         discard("no impact on the run")
 
 
-def discard_onset_of_slip(case: Case) -> None:
-    """Discard the example if a contact that stuck begins to slip on its run.
+def discard_what_rounding_decides(case: Case) -> None:
+    """Discard the example if on its run a contact that stuck begins to slip, or several close at once.
 
     The mode that held the slip leaves it at zero but for rounding, whose sign the next mode sees: in a system
-    that is written differently it is another one.
+    that is written differently it is another one. Which of several gaps closes first is rounding, too.
     """
     growth = contacts_of(case.system)
     if growth is None:
         return
-    titles = {f"{each.name} slips" for each in growth.contacts}
-    if any(case.transition(jump).part_of in titles for jump in case.run.arc.jumps):
+    names = [each.name for each in growth.contacts]
+    titles = [case.transition(jump).part_of or "" for jump in case.run.arc.jumps]
+    if not {f"{name} slips" for name in names}.isdisjoint(titles):
         discard("a contact that stuck begins to slip, where its slip is zero but for rounding")
+    if any(title.count("+") and {*title.split("+")} <= {*names} for title in titles):
+        discard("several contacts close at once, in an order that rounding decides")
 
 
 def gains_on(case: Case) -> Iterator[str]:

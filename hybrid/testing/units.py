@@ -20,7 +20,6 @@ from hybrid.system.laws import Laws
 from hybrid.system.moving import moving_numbers
 from hybrid.system.variables import PARAMETERS, STATE, named_values
 from hybrid.testing.case import Case, as_case
-from hybrid.testing.contacts import discard_onset_of_slip
 from hybrid.testing.errors import discard
 from hybrid.testing.invariance import compare
 from hybrid.testing.variants import free_name
@@ -81,7 +80,6 @@ def check_units(case: Case) -> None:
     >>> check_units(case)
     """
     as_case(case)
-    discard_onset_of_slip(case)
     if compile_system(case.system).emitted.opaque:
         discard("a model function cannot be traced, so it cannot be changed")
     exponent = round(LARGEST_EXPONENT * (2.0 * case.fraction - 1.0))

@@ -121,7 +121,10 @@ def complementarity(
     found = _checked(pairs)
     values = as_parameters({} if parameters is None else parameters)
     components = as_state(state)
-    equations = Equations(Variables(components, values), rates, found, modes)
+    variables = Variables(components, values)
+    if not variables.dimension:
+        raise ModelError("complementarity: state must have at least one component; got none.")
+    equations = Equations(variables, rates, found, modes)
     judge = Judge(equations)
     _check_degrees(judge)
     own = as_outputs({} if outputs is None else outputs, "complementarity")

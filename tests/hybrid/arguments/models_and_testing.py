@@ -56,7 +56,11 @@ def checks():
                     "solver": SOLVER,
                     "engine": [None, "a", 3, Odd()],
                     "passable": [None, 3, ["nope"], "nope", [3]],
-                    **({} if function is hybrid.testing.cases else {"examples": [0, *COUNT], **LAWS}),
+                    **(
+                        {}
+                        if function is hybrid.testing.cases
+                        else {"examples": [0, *COUNT], "progress": [3, "a"], **LAWS}
+                    ),
                 },
             )
             for function in (hybrid.testing.cases, hybrid.testing.check_system)
@@ -88,6 +92,9 @@ def laws():
     return [
         (call(models.interleaved_converter, 2), {"phases": [0, *COUNT]}),
         (call(models.pulse_coupled_neurons, 2), {"count": [0, *COUNT]}),
+        (call(models.verge_escapement), {"teeth": [0, *COUNT]}),
+        (call(models.newtons_cradle), {"balls": [0, *COUNT], "impacts": [None, 3, "hertz", Odd()]}),
+        (call(models.shaken_stack), {"boxes": [0, *COUNT]}),
         (call(models.dosing_schedule), {"times": [*QUANTITY[:-2], [], [math.nan]]}),
         (call(models.infusion_schedule), {"frame": [*LIST, [], {"t": []}]}),
         (call(models.vibroimpact), {"contact": ["a", 3, 0, False, contact.Rigid, Odd()]}),

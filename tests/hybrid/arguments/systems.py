@@ -226,6 +226,36 @@ def systems():
             },
         ),
         (
+            call(hybrid.Pair, "diode", lambda t, x, z, p: x.q),
+            {
+                "name": [None, 3, "", "1q", "a b", "free", Odd()],
+                "w": [None, *FUNCTION],
+                "says": [None, 3, True, "a+b", Odd()],
+            },
+        ),
+        (
+            call(
+                hybrid.complementarity,
+                state=("q",),
+                rates=lambda t, x, z, p: (z.diode - p.e,),
+                pairs=[hybrid.Pair("diode", lambda t, x, z, p: x.q)],
+                parameters={"e": 0.5},
+            ),
+            {
+                "state": [*BAD_STATES, {"q", "v"}, Odd()],
+                "rates": [None, *FUNCTION, lambda t, x, z, p: (1.0, 2.0)],
+                "pairs": [*LIST, [], [1], ["a"]],
+                "parameters": PARAMETERS,
+                "modes": CALLED,
+                "period": [*LIMIT[1:], math.inf],
+                "name": TEXT,
+                "units": UNITS,
+                "angles": ANGLES,
+                "outputs": OUTPUTS,
+                "laws": [*FUNCTION, {}, Odd()],
+            },
+        ),
+        (
             call(Guard, lambda t, x, p: x.q),
             {
                 "function": [None, *FUNCTION],
