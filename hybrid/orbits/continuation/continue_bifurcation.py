@@ -309,6 +309,11 @@ def _start(bifurcation: Bifurcation, names: tuple[str, str], sizes: np.ndarray, 
             "bifurcation is a branch point, which goes away when another parameter changes; allowed are the "
             "other kinds."
         )
+    if bifurcation.kind == "Hopf":
+        raise ArgumentError(
+            "bifurcation is the Hopf point at which a branch of cycles ends, where no orbit is left; follow "
+            "that of the equilibrium, from continue_equilibrium."
+        )
     if bifurcation.kind not in KINDS and bifurcation._zero_of.function is None:
         raise ArgumentError(
             f"bifurcation is a zero of events[{bifurcation.kind!r}] of a branch that was opened again or "

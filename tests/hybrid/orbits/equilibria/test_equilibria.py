@@ -213,9 +213,9 @@ def test_a_neutral_saddle_is_no_hopf_point():
 def test_small_cycles_begin_at_a_hopf_point():
     """The cycles of the Brusselator have the frequency of the eigenvalues where they begin."""
     brusselator = plain(
-        lambda t, x, p: (1.0 - (p.B + 1.0) * x.x + x.x**2 * x.y, p.B * x.x - x.x**2 * x.y),
+        lambda t, x, p: (p.A - (p.B + 1.0) * x.x + x.x**2 * x.y, p.B * x.x - x.x**2 * x.y),
         ("x", "y"),
-        {"B": 1.5},
+        {"A": 1.0, "B": 1.5},
     )
     [hopf] = continue_equilibrium(equilibrium(brusselator, (1.0, 1.0)), "B", (1.0, 3.0)).of("Hopf")
     assert abs(hopf.value - 2.0) < 1e-10
@@ -230,6 +230,8 @@ def test_small_cycles_begin_at_a_hopf_point():
     assert abs(end.orbit.period - hopf.period) < 1e-10
     assert end.coefficient == pytest.approx(hopf.coefficient)
     assert min(branch.parameter) == end.value
+    with pytest.raises(hybrid.ArgumentError, match="follow that of the equilibrium"):
+        hybrid.continue_bifurcation(end, {"B": (1.5, 2.2), "A": (0.5, 1.5)})
 
 
 @pytest.mark.parametrize("units", [(1.0, 1.0), (1e-6, 1e4)], ids=["plain", "other units"])
