@@ -46,6 +46,7 @@ linkcheck_anchors = False
 
 html_theme = "pydata_sphinx_theme"
 html_title = "hybrid"
+html_favicon = "icon.svg"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = False

@@ -108,7 +108,8 @@ def build(kind: str, source: Path, into: Path, output: Path) -> int:
 def write_pages(source: Path) -> None:
     """Everything that Sphinx reads."""
     source.mkdir(parents=True)
-    shutil.copy(HERE / "conf.py", source)
+    for name in ("conf.py", "icon.svg"):
+        shutil.copy(HERE / name, source)
     (source / "_static").mkdir()
     shutil.copy(HERE / "site.css", source / "_static")
     for page in [*HERE.rglob("*.md"), *map(ROOT.joinpath, OUTSIDE)]:
