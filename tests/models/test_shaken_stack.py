@@ -44,16 +44,12 @@ def test_a_stack_with_the_smoothest_contact_below_slides_as_one():
 
 
 def test_two_equal_contacts_that_reach_their_bounds_at_once_slide_as_one():
-    """Any share of the slip between them obeys Coulomb's law at that instant, and the lower one goes on.
-
-    Or the run says that it depends on rounding, and stops.
-    """
+    """Any share of the slip between them obeys Coulomb's law at that instant, and the lower one goes on."""
     parameters = {"A": 0.6, "mu1": 0.2, "mu2": 0.2}
     arc = hybrid.simulate(shaken_stack(), np.zeros(8), (0.0, 2.0), parameters=parameters)
-    end = arc.t[-1]
-    assert arc.status.code == hybrid.StatusCode.STUCK or end == pytest.approx(2.0)
+    assert arc.t[-1] == pytest.approx(2.0)
     alone = hybrid.simulate(
-        shaken_stack(1), np.zeros(4), (0.0, end), parameters={"A": 0.6, "mu1": 0.2, "m1": 2.0}
+        shaken_stack(1), np.zeros(4), (0.0, 2.0), parameters={"A": 0.6, "mu1": 0.2, "m1": 2.0}
     )
     np.testing.assert_allclose(arc.x[-1, [0, 1]], alone.x[-1, 0], atol=1e-9)
     np.testing.assert_allclose(arc.x[-1, [4, 5]], alone.x[-1, 2], atol=1e-9)

@@ -15,6 +15,7 @@ from hybrid.expression.nodes import ZERO, Expression, node
 from hybrid.system.elements import Function
 from hybrid.system.growth import Place
 from hybrid.transform.contacts.equations import Space
+from hybrid.transform.contacts.kinematics import Row
 from hybrid.transform.contacts.problem import (
     DEPENDENT,
     Combination,
@@ -138,7 +139,28 @@ def _moving(
     [found] = solved(equations, [right], numbers, definite=space.size)
     solution = found[space.size :]
     forces = [first + dot([column[row] for column in unknowns], solution) for row, first in enumerate(start)]
-    return forces, found[: space.size]
+    told = _told([(own[row], target) for row, target in wanted])
+    return forces, [told.get(j, each) for j, each in enumerate(found[: space.size])]
+
+
+def _told(wanted: Sequence[tuple[Row, Any]]) -> dict[int, Expression]:
+    """The accelerations that rows with targets tell one after another, each from those before it.
+
+    The elimination gives the same with rounding, and a body at rest would be told to move by that.
+    """
+    found: dict[int, Expression] = {}
+    waiting = [*wanted]
+    while waiting:
+        for row, target in waiting:
+            free = [j for j, weight in enumerate(row.weights) if weight is not ZERO and j not in found]
+            if len(free) == 1 and row.weights[free[0]].is_number:
+                others = dot([row.weights[j] for j in found], [*found.values()])
+                found[free[0]] = (node(target) - row.bias - others) / row.weights[free[0]]
+                waiting.remove((row, target))
+                break
+        else:
+            break
+    return found
 
 
 def _gap_drawn_back(mechanics: Mechanics, i: int, pace: float) -> Expression:
