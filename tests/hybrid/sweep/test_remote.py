@@ -107,7 +107,7 @@ def test_a_broken_pool_is_said_and_the_rest_is_computed_later(tmp_path):
 
 def test_the_extra_is_named(pool, monkeypatch):
     monkeypatch.setitem(sys.modules, "cloudpickle", None)
-    with pytest.raises(HybridError, match=r"executor= needs the package cloudpickle.*hybrid-systems\[grid\]"):
+    with pytest.raises(HybridError, match=r"executor= needs the package cloudpickle.*'\.\[grid\]'"):
         sweep(lambda p: {"y": 1.0}, {"a": [1.0]}, executor=pool)
 
 
