@@ -63,7 +63,9 @@ class Elimination:
             row = self.pivots[k]
             known = node(dot(self.upper[row][k + 1 :], found[k + 1 :]))
             found[k] = (right[row] - known) / self.upper[row][k]
-        _remember(LinearEquations(self, [*column]), found)
+        if self.steps:
+            # A mere quotient may stand in any model: what is made of it must not hang on this one.
+            _remember(LinearEquations(self, [*column]), found)
         return found
 
     def row_of_inverse(self, k: int) -> Vector:
