@@ -126,9 +126,9 @@ def _columns(
     equations: LinearEquations, known: Mapping[Expression, dict[Symbol, Expression]]
 ) -> dict[Symbol, list[Expression]]:
     """What the partial derivatives of the unknowns of linear equations are solved from."""
-    inputs = equations.inputs
+    inputs, x = equations.inputs, equations.solution
     return {
-        v: equations.column_of_derivative({each: known[each].get(v, ZERO) for each in inputs}.__getitem__)
+        v: equations.column_of_derivative(x, {each: known[each].get(v, ZERO) for each in inputs}.__getitem__)
         for v in {v: None for each in inputs for v in known[each]}
     }
 

@@ -103,15 +103,19 @@ class LinearEquations:
         """What ``A`` and ``b`` are made of."""
         return [*(each for row in self.elimination.matrix for each in row if each is not ZERO), *self.column]
 
-    def column_of_derivative(self, slope: Callable[[Expression], Expression]) -> Vector:
-        """``b_v - A_v x``, from the derivative of each input."""
-        x = self.elimination.solution(self.column)
+    @property
+    def solution(self) -> Vector:
+        """The solution ``x``, made anew: kept here it would keep itself alive."""
+        return self.elimination.solution(self.column)
+
+    def column_of_derivative(self, x: Vector, slope: Callable[[Expression], Expression]) -> Vector:
+        """``b_v - A_v x``, from the solution and the derivative of each input."""
         slopes = [[ZERO if each is ZERO else slope(each) for each in row] for row in self.elimination.matrix]
         return [slope(b) - dot(row, x) for row, b in zip(slopes, self.column, strict=True)]
 
     def derivative(self, slope: Callable[[Expression], Expression]) -> Vector:
         """The derivative of ``x``, from that of each input."""
-        return self.elimination.solution(self.column_of_derivative(slope))
+        return self.elimination.solution(self.column_of_derivative(self.solution, slope))
 
 
 # By solution: its equations, and which of the unknowns it is. It lives as long as the solution does.

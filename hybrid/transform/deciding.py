@@ -8,7 +8,7 @@ the transitions of an event holds, the run ends, and what follows is decided the
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import reduce
 from typing import Any
 
@@ -18,9 +18,10 @@ from hybrid.expression.evaluation import expressed, scalar
 from hybrid.expression.nodes import ONE, Expression
 from hybrid.expression.operations import And, Not
 from hybrid.system.clocks import Clock
-from hybrid.system.elements import Guard, Reset, Transition
+from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.system.growth import Finished, Place
+from hybrid.system.outputs import Output
 from hybrid.transform.stages import Stages, numbered
 
 
@@ -167,6 +168,21 @@ class Deciding(Stages):
     def _unused(self, name: str) -> str:
         used = {each.name for watch in self._all_watches() for each, _ in watch.cases}
         return next(each for each in numbered(name) if each not in used)
+
+    @abstractmethod
+    def _outputs(self) -> dict[str, Output]:
+        """What is told in the modes that have been made."""
+
+    def _with_modes(self, modes: Sequence[Mode], notes: Iterable[str]) -> HybridSystem:
+        """The system with the modes that have been made, and with notes besides its own."""
+        given: dict[str, Any] = {
+            "modes": modes,
+            "transitions": self._transitions(),
+            "outputs": {**self.original.outputs, **self._outputs()},
+            "notes": (*self.original.notes, *notes),
+            "growth": self,
+        }
+        return attrs.evolve(self.original, **given)
 
     def _transitions(self) -> list[Transition]:
         """The transitions that have been made, and those that end a run where none of these holds."""

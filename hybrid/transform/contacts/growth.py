@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Any
 
 import attrs
 import numpy as np
@@ -300,14 +299,7 @@ class ContactGrowth(Deciding):
         """The system of what has been made."""
         modes = [each.mode for each in self.made.values()]
         moments = [Mode(name, self.still) for name in self._moments]
-        given: dict[str, Any] = {
-            "modes": [*modes, *moments],
-            "transitions": self._transitions(),
-            "outputs": {**self.original.outputs, **self._outputs()},
-            "notes": (*self.original.notes, *self.notes),
-            "growth": self,
-        }
-        return attrs.evolve(self.original, **given)
+        return self._with_modes([*modes, *moments], self.notes)
 
     @property
     def _moments(self) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import product
-from typing import Any
 
 import attrs
 import numpy as np
@@ -293,14 +292,7 @@ class PairGrowth(Deciding):
         modes = [each.mode for each in self.made.values()]
         if self.begins:
             modes.append(Mode(BEGINNING, self.first.mode.field))
-        given: dict[str, Any] = {
-            "modes": modes,
-            "transitions": self._transitions(),
-            "outputs": {**self.original.outputs, **self._outputs()},
-            "notes": (*self.original.notes, *self.equations.names.notes, *self.notes),
-            "growth": self,
-        }
-        return attrs.evolve(self.original, **given)
+        return self._with_modes(modes, [*self.equations.names.notes, *self.notes])
 
     def _outputs(self) -> dict[str, Output]:
         """``w`` and ``z`` of each pair, in the modes that have been made."""

@@ -31,17 +31,6 @@ PLOTS = {
 }
 
 
-@pytest.fixture(autouse=True)
-def _no_figures_left():
-    yield
-    plt.close("all")
-
-
-@pytest.fixture(scope="module")
-def bounces():
-    return simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 2.0))
-
-
 @pytest.fixture(scope="module")
 def prints():
     with pytest.MonkeyPatch.context() as patched:

@@ -16,17 +16,6 @@ from hybrid import ArgumentError, Guard, HybridSystem, Mode, Transition, simulat
 from hybrid.plot import plot, plot_arc, plot_graph, plot_phase
 
 
-@pytest.fixture(autouse=True)
-def _no_figures_left():
-    yield
-    plt.close("all")
-
-
-@pytest.fixture(scope="module")
-def bounces():
-    return simulate(models.bouncing_ball(), (1.0, 0.0), (0.0, 2.0))
-
-
 @pytest.fixture(scope="module")
 def contacts():
     start = (-0.00765806, -0.00411675, 0.05565196, -0.35621583)
