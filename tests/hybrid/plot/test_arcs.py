@@ -6,7 +6,6 @@ import pytest
 
 mpl.use("Agg")
 
-import matplotlib.pyplot as plt
 
 import models
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition, simulate, stroboscopic_section
@@ -29,12 +28,6 @@ TURNS = HybridSystem(
     ],
     period=1.0,
 )
-
-
-@pytest.fixture(autouse=True)
-def _no_figures_left():
-    yield
-    plt.close("all")
 
 
 @pytest.fixture(scope="module")

@@ -15,12 +15,6 @@ from hybrid.plot.styles import COLOURS, colour_of
 from tests.hybrid.plot.legible import illegible
 
 
-@pytest.fixture(autouse=True)
-def _no_figures_left():
-    yield
-    plt.close("all")
-
-
 @pytest.mark.parametrize("component", [1, -2, "b", np.int64(1), np.int8(-2)])
 def test_components_by_name_and_by_index(component):
     assert as_component("x", ("a", "b", "c"), component) == 1

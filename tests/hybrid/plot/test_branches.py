@@ -7,7 +7,6 @@ import xarray
 
 mpl.use("Agg")
 
-import matplotlib.pyplot as plt
 
 import hybrid
 import models
@@ -16,12 +15,6 @@ from hybrid.measures import amplitude, maximum, minimum
 from hybrid.plot import COLOURS, plot, plot_branch
 
 OUTPUTS = {"amplitude": amplitude("x"), "low": minimum("x")}
-
-
-@pytest.fixture(autouse=True)
-def _no_figures_left():
-    yield
-    plt.close("all")
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,6 @@ import pytest
 
 mpl.use("Agg")
 
-import matplotlib.pyplot as plt
 
 import models
 from hybrid import ArgumentError, simulate
@@ -14,12 +13,6 @@ from hybrid.plot import plot, plot_arc, plot_contacts
 from hybrid.plot.contacts import IMPACT_COLOUR, STATES
 from hybrid.plot.styles import colour_of
 from tests.hybrid.transform.contacts.scenes import G, beam, block
-
-
-@pytest.fixture(autouse=True)
-def _no_figures_left():
-    yield
-    plt.close("all")
 
 
 @pytest.fixture(scope="module")

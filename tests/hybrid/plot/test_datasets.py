@@ -15,12 +15,6 @@ from hybrid import ArgumentError, Guard, HybridSystem, Mode, Reset, Transition
 from hybrid.plot import plot
 
 
-@pytest.fixture(autouse=True)
-def _no_figures_left():
-    yield
-    plt.close("all")
-
-
 def swept(shape, *, failed=()):
     """What a sweep over axes ``a, b, c`` returns, with a number in metres and an array per point."""
     dims = tuple("abc"[: len(shape)])

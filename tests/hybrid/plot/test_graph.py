@@ -17,12 +17,6 @@ from hybrid.plot.styles import COLOURS
 from tests.hybrid.plot.legible import illegible
 
 
-@pytest.fixture(autouse=True)
-def _no_figures_left():
-    yield
-    plt.close("all")
-
-
 def system(names, pairs, *, direction=1, reset=None, at_start=False):
     """Modes with one-letter names, and transitions given as ``ab``, numbered; ``a.`` ends the run."""
     return HybridSystem(

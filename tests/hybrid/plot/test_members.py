@@ -2,20 +2,12 @@
 
 import matplotlib as mpl
 import numpy as np
-import pytest
 
 mpl.use("Agg")
 
-import matplotlib.pyplot as plt
 
 from hybrid import Every, Guard, HybridSystem, Mode, Reset, Transition, repeat, simulate
 from hybrid.plot import plot_arc, plot_graph, plot_jumps, plot_phase
-
-
-@pytest.fixture(autouse=True)
-def _no_figures_left():
-    yield
-    plt.close("all")
 
 
 def pack(count):

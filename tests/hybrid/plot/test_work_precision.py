@@ -8,17 +8,10 @@ import pytest
 
 mpl.use("Agg")
 
-import matplotlib.pyplot as plt
 
 from hybrid.plot import plot_work_precision
 from hybrid.plot.styles import COLOURS
 from hybrid.plot.work_precision import LABEL_HEIGHT, MARKERS
-
-
-@pytest.fixture(autouse=True)
-def _no_figures_left():
-    yield
-    plt.close("all")
 
 
 class Made:
