@@ -14,16 +14,14 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.compiler.agreement import check_agreement
-from hybrid.compiler.arrays import clock_arrays, indices, leaving
-from hybrid.compiler.cache import store
+from hybrid.compiler.arrays import graph_arrays, indices
 from hybrid.compiler.cache.folder import announced
 from hybrid.compiler.cache.loader import Absent, load_kernels
+from hybrid.compiler.emission import emitted_of, text_of
 from hybrid.compiler.parts import EVENTS, FIELDS, SERIES, SLOPES, TANGENT_SERIES, VARIATIONAL
-from hybrid.compiler.surfaces import is_paired
 from hybrid.compiler.tables import Knots, unpacked
-from hybrid.compiler.traced import key_of
 from hybrid.errors import ArgumentError, ModelError
-from hybrid.kernels.types.codes import DESINGULARISED, NARROW, NO_MODE, ROOTED, RUNGE_KUTTA
+from hybrid.kernels.types.codes import DESINGULARISED, NARROW, ROOTED, RUNGE_KUTTA
 from hybrid.kernels.types.layout import Model, Programs
 from hybrid.system.functions import CLOCK, CONDITION, NUMBER, ModelFunction
 from hybrid.system.graph import HybridSystem, as_system, functions_of, watched_by
@@ -188,14 +186,19 @@ class CompiledSystem:
             growth = self.system.growth
             with announced(f"hybrid: compiling {self.system.name or 'the model'} ..."):
                 if growth is None or self._own:
-                    self.parts[part] = compiled_part(self.emitted, part, self._own)
+                    self.parts[part] = compiled_part(self._text(part), part, self._own)
                 else:
                     transitions = 2 * len(self.system.transitions)
                     # Behind the fields of all modes there are two for a crossing at most.
                     indices = len(self.system.modes) + transitions + len(self.emitted.moving)
-                    self.parts[part] = compiled_stage(self.emitted, part, growth.written, indices)
+                    self.parts[part] = compiled_stage(self._text(part), part, growth.written, indices)
         found: dict[str, Any] = self.parts[part]
         return found
+
+    def _text(self, part: str) -> str:
+        if part not in self.emitted.texts:
+            self.emitted.texts[part] = text_of(self.system, part)
+        return self.emitted.texts[part]
 
     @cached_property
     def _own(self) -> Any:
@@ -319,10 +322,8 @@ class CompiledSystem:
 
     @cached_property
     def _model(self) -> Any:
-        system = self.system
-        transitions = system.transitions
-        first_outgoing, outgoing = leaving(system, lambda each: each.is_searched)
-        first_at_start, at_start = leaving(system, lambda each: each.guard.at_start)
+        values = self.system.parameter_values()
+        modes = len(self.system.modes)
         return Model(
             **self.functions(FIELDS),
             **self.functions(EVENTS),
@@ -330,42 +331,13 @@ class CompiledSystem:
             variational_field=Absent(),
             series=Absent(),
             **self.emitted.arrays(),
+            **graph_arrays(self.system, self.emitted),
             row=self.emitted.row,
-            parameters=self.with_tables(system.parameter_values()),
-            **{**_no_knots(len(system.modes)), **self.knots_at(system.parameter_values())},
-            dimension=system.dimension,
-            controlled=system.tangent_dimension,
-            first_outgoing=first_outgoing,
-            outgoing=outgoing,
-            first_at_start=first_at_start,
-            at_start=at_start,
-            **clock_arrays(system, self.emitted),
-            target=indices(_index_or_none(system, transition.target) for transition in transitions),
-            direction=indices(transition.guard.direction for transition in transitions),
+            parameters=self.with_tables(values),
+            **{**_no_knots(modes), **self.knots_at(values)},
             programs=self._programs,
             **_program_runners(bool(self.emitted.programs.rows)),
-            **_slopes(self.emitted.slope_columns),
-            paired=indices(is_paired(system, self.emitted, i) for i in range(len(transitions))),
-            marker=indices(transition.is_marker for transition in transitions),
-            accumulates_to=indices(
-                _index_or_none(system, transition.accumulates_to) for transition in transitions
-            ),
-            propagator=indices(propagator.kind for propagator in self.emitted.propagators),
-            degree=indices(propagator.degree for propagator in self.emitted.propagators),
-            bounded=indices([self.emitted.pulses_excluded(mode) for mode in range(len(system.modes))]),
-            fragile=indices(self.emitted.is_fragile(mode) for mode in range(len(system.modes))),
-            steep=indices(bool(powers) for powers in self.emitted.steep),
-            root=indices(propagator.root for propagator in self.emitted.propagators),
-            field_before=indices(before for before, _ in self.emitted.crossing),
-            field_behind=indices(behind for _, behind in self.emitted.crossing),
-            timed=indices(self._is_timed(i) for i in range(len(system.modes))),
-            conditional=indices(
-                any(each.source == name and each.guard.when is not None for each in transitions)
-                for name in system.mode_names
-            ),
-            timed_jump=indices(map(max, self.emitted.timed_guard, self.emitted.timed_reset)),
             tangent_start=self.emitted.tangent_start,
-            tangent_columns=indices(each.series.tangent_columns for each in self.emitted.propagators),
             period=0.0,
         )
 
@@ -380,20 +352,6 @@ class CompiledSystem:
         emitted = self.emitted
         return not all(emitted.autonomous) or any(emitted.timed_guard) or any(emitted.timed_reset)
 
-    def _is_timed(self, mode: int) -> bool:
-        """Whether the field of a mode, or one of the guards in it, may depend on time."""
-        emitted, name = self.emitted, self.system.mode_names[mode]
-        pairs = zip(self.system.transitions, emitted.timed_guard, strict=True)
-        return not emitted.autonomous[mode] or any(timed for each, timed in pairs if each.source == name)
-
-
-def _slopes(columns: Sequence[Sequence[Sequence[int]]]) -> dict[str, np.ndarray]:
-    """The entries of the Jacobians of all modes: where each row begins and ends, and their columns."""
-    rows = [row for of_mode in columns for row in of_mode]
-    n, ends = len(columns[0]), np.cumsum([0, *map(len, rows)])
-    first = np.array([ends[n * mode : n * mode + n + 1] for mode in range(len(columns))])
-    return {"first_slope": first, "slope_column": indices(column for row in rows for column in row)}
-
 
 def _program_runners(needed: bool) -> dict[str, Any]:
     """The kernels that run interval programs; they are loaded only if there are programs."""
@@ -401,10 +359,6 @@ def _program_runners(needed: bool) -> dict[str, Any]:
         return {"bound": Absent(), "spread": Absent()}
     bounds = load_kernels("hybrid.kernels.events.bounds")
     return {"bound": bounds.bound_guard, "spread": bounds.spread_by_rounding}
-
-
-def _index_or_none(system: HybridSystem, mode: str | None) -> int:
-    return NO_MODE if mode is None else system.mode_index(mode)
 
 
 def _no_knots(modes: int) -> dict[str, np.ndarray]:
@@ -470,19 +424,3 @@ def _watched(system: HybridSystem) -> Watched:
     with suppress(AttributeError):
         object.__delattr__(system, "switching")
     return watched_by(system)
-
-
-def emitted_of(system: HybridSystem) -> Emitted:
-    """The result of `emit` for a system, computed now or stored by an earlier process."""
-    traces = {} if system.growth is None else system.growth.written
-    key = key_of(system, traces)
-    found = None if key is None else store.read(key)
-    if found is not None:
-        return found
-    # What derives and writes is imported only now.
-    from hybrid.compiler.emit import emit
-
-    emitted = emit(system, traces)
-    if key is not None and not emitted.opaque:
-        store.write(key, emitted)
-    return emitted

@@ -21,7 +21,7 @@ from hybrid.compiler.cases import body_text, cases_of_index, function_text
 from hybrid.compiler.curvature import curvature
 from hybrid.compiler.emitted import Emitted, Programs, Propagator, Series
 from hybrid.compiler.jacobians import gradient, slope_columns, with_time, zeros_first
-from hybrid.compiler.parts import PARTS
+from hybrid.compiler.parts import LATER, PARTS
 from hybrid.compiler.places import placed
 from hybrid.compiler.readers import is_free, readers
 from hybrid.compiler.rows import moving_places
@@ -30,7 +30,7 @@ from hybrid.compiler.steep import steep_inside
 from hybrid.compiler.told import told, where_it_jumps
 from hybrid.compiler.traced import Traces
 from hybrid.compiler.writer import Writer
-from hybrid.compiler.written import variational
+from hybrid.compiler.written import Written, variational
 from hybrid.expression.continuity import has_jumps, may_be_abrupt
 from hybrid.expression.graph import forget
 from hybrid.expression.signs import simplified
@@ -58,50 +58,80 @@ def emit(system: HybridSystem, traces: Traces | None = None) -> Emitted:
         forget()
 
 
+def text_of(system: HybridSystem, part: str) -> str:
+    """The text of a part that `emit` has left out."""
+    assert system.growth is not None
+    try:
+        return _text(Sources(system, Writer(system, system.growth.written)), part)
+    finally:
+        forget()
+
+
 def _texts(a: Sources) -> dict[str, str]:
-    bodies = _bodies(a)
-    return {
-        part: a.tables.located("".join(function_text(name, cases_of_index(bodies[name])) for name in names))
-        for part, names in PARTS.items()
-    }
+    texts = {part: _text(a, part) for part in PARTS if part not in LATER}
+    # What is shared by all parts of a model is laid out once: the numbers of tables and what is not traced.
+    waits = a.system.growth is not None and not a.tables.places and not a.writer.opaque
+    return texts if waits else texts | {part: _text(a, part) for part in LATER}
 
 
-def _bodies(a: Sources) -> dict[str, list[str]]:
-    """By function: the text of its statements for each index."""
-    n, text, symbols = a.system.dimension, a.writer.text, a.symbols
-    return {
-        "field": [*(text("value", each, each.value) for each in a.evaluated), *map(body_text, a.crossing[1])],
-        "field_jacobian": [
-            text("jacobian", each, partial(with_time, each.derivative, n)) for each in a.evaluated
-        ],
-        "variational_field": [
-            text("variational", each, partial(variational, each, n)) for each in a.evaluated
-        ],
-        "guard": [text("value", each, each.value) for each in (*a.guards, *a.conditions, *a.numbers)],
-        "guard_gradient": [
-            text("gradient", each, partial(gradient, each.derivative, n)) for each in a.guards
-        ],
-        "guard_curvature": [
-            text(f"curvature {straight}", each, partial(curvature, expression, straight, symbols))
-            for each, expression, straight in zip(a.guards, a.traced, a.affine, strict=True)
-        ],
-        "reset": [text("value", each, each.value) for each in a.resets],
-        "reset_jacobian": [
-            text("slopes", each, partial(zeros_first, each.derivative, n)) for each in a.resets
-        ],
-        "series": placed(a.places, [text("series", each, each.statements) for each in a.series]),
-        "tangent_series": placed(
-            a.places, [text("tangent", each, each.tangent_statements) for each in a.series]
-        ),
-        # Registers of several runs are no entries of arrays, which loops over statements need.
-        "series_abreast": placed(
-            a.places_abreast, [text("series", each, each.statements, roll=False) for each in a.abreast]
-        ),
-        "tangent_series_abreast": placed(
-            a.places_abreast,
-            [text("tangent", each, each.tangent_statements, roll=False) for each in a.abreast],
-        ),
-    }
+def _text(a: Sources, part: str) -> str:
+    cases = {name: cases_of_index(BODIES[name](a)) for name in PARTS[part]}
+    return a.tables.located("".join(function_text(name, each) for name, each in cases.items()))
+
+
+def _values(a: Sources, functions: Sequence[Written]) -> list[str]:
+    return [a.writer.text("value", each, each.value) for each in functions]
+
+
+def _curvatures(a: Sources) -> list[str]:
+    return [
+        a.writer.text(f"curvature {straight}", each, partial(curvature, expression, straight, a.symbols))
+        for each, expression, straight in zip(a.guards, a.traced, a.affine, strict=True)
+    ]
+
+
+def _derivatives(a: Sources, name: str, rows: Any, functions: Sequence[Written]) -> list[str]:
+    n = a.system.dimension
+    return [a.writer.text(name, each, partial(rows, each.derivative, n)) for each in functions]
+
+
+def _series(a: Sources) -> list[str]:
+    return placed(a.places, [a.writer.text("series", each, each.statements) for each in a.series])
+
+
+def _tangent_series(a: Sources) -> list[str]:
+    return placed(a.places, [a.writer.text("tangent", each, each.tangent_statements) for each in a.series])
+
+
+# Registers of several runs are no entries of arrays, which loops over statements need.
+def _series_abreast(a: Sources) -> list[str]:
+    texts = [a.writer.text("series", each, each.statements, roll=False) for each in a.abreast]
+    return placed(a.places_abreast, texts)
+
+
+def _tangent_series_abreast(a: Sources) -> list[str]:
+    texts = [a.writer.text("tangent", each, each.tangent_statements, roll=False) for each in a.abreast]
+    return placed(a.places_abreast, texts)
+
+
+# By function: what writes its statements for each index.
+BODIES: dict[str, Callable[[Sources], list[str]]] = {
+    "field": lambda a: [*_values(a, a.evaluated), *map(body_text, a.crossing[1])],
+    "field_jacobian": lambda a: _derivatives(a, "jacobian", with_time, a.evaluated),
+    "variational_field": lambda a: [
+        a.writer.text("variational", each, partial(variational, each, a.system.dimension))
+        for each in a.evaluated
+    ],
+    "guard": lambda a: _values(a, [*a.guards, *a.conditions, *a.numbers]),
+    "guard_gradient": lambda a: _derivatives(a, "gradient", gradient, a.guards),
+    "guard_curvature": _curvatures,
+    "reset": lambda a: _values(a, a.resets),
+    "reset_jacobian": lambda a: _derivatives(a, "slopes", zeros_first, a.resets),
+    "series": _series,
+    "tangent_series": _tangent_series,
+    "series_abreast": _series_abreast,
+    "tangent_series_abreast": _tangent_series_abreast,
+}
 
 
 def _programs(a: Sources) -> Programs:

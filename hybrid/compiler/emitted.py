@@ -117,6 +117,7 @@ class Emitted:
     ----------
     texts
         By part of ``hybrid.compiler.parts``: the functions of the part as text (``hybrid.compiler.cases``).
+        Those of ``LATER`` may be missing (``hybrid.compiler.emit.text_of``).
         Behind the guards, ``guard`` has their conditions; for a guard without one it leaves ``out`` alone.
         The same model gives the same text, in any process.
     affine_guard

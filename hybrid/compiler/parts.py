@@ -16,3 +16,6 @@ PARTS = {
     ABREAST_SERIES: ("series_abreast",),
     ABREAST_TANGENT_SERIES: ("tangent_series_abreast",),
 }
+# What runs without tangent vectors, and single ones, do without. A system that grows has a new text for each
+# stage, so it writes these parts when a run asks for them.
+LATER = (VARIATIONAL, TANGENT_SERIES, ABREAST_SERIES, ABREAST_TANGENT_SERIES)

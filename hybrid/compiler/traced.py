@@ -95,7 +95,9 @@ def key_of(system: HybridSystem, traces: Traces) -> str | None:
         ]
         for transition in system.transitions
     ]
-    names = [system.state, system.held, system.counters, [*system.parameters], [*system.mode_names]]
+    # The series of a system that grows have room for further modes, and texts may be left out.
+    grows = system.growth is not None
+    names = [grows, system.state, system.held, system.counters, [*system.parameters], [*system.mode_names]]
     timed = system.period is not None, period is not None
     listed = _listed([*expressions, *([] if period is None else [period])])
     return json.dumps([names, graph, functions, timed, listed])

@@ -38,6 +38,21 @@ def write(key: str, emitted: Emitted) -> None:
     keep(models_folder() / _file(key), text.encode())
 
 
+def read_text(key: str, part: str) -> str | None:
+    """The text of a part that was left out of what was written; None if missing or damaged."""
+    content = kept_of_model(_text_file(key, part))
+    return None if content is None else content.decode()
+
+
+def write_text(key: str, part: str, text: str) -> None:
+    """Store the text of a part that was left out."""
+    keep(models_folder() / _text_file(key, part), text.encode())
+
+
+def _text_file(key: str, part: str) -> str:
+    return f"text_{_digest(f'{part} {key}')}.txt"
+
+
 def _file(key: str) -> str:
     return f"emitted_{_digest(key)}.json"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,7 @@ from hybrid.compiler.llvm.lowering import (
 from hybrid.compiler.llvm.machine import machine_code
 from hybrid.compiler.opaque import compiled_functions
 from hybrid.compiler.parts import PARTS, SLOPES
+from hybrid.compiler.statements.code import bodies_in
 
 if TYPE_CHECKING:
     from hybrid.compiler.emitted import Emitted
@@ -49,6 +50,8 @@ SIGNATURES = {
 FUSED = ("series", "tangent_series", "series_abreast", "tangent_series_abreast")
 # What runs call once for an event, not on every step.
 RARE = PARTS[SLOPES]
+# The least share of the work in loops over statements at which passes for loops are worth their time.
+IN_LOOPS = 0.9
 # What writes the instructions of these functions.
 BODIES = dict.fromkeys(("series_abreast", "tangent_series_abreast"), AbreastBody)
 
@@ -67,24 +70,24 @@ def own_functions(emitted: Emitted) -> dict[str, tuple[Any, int]]:
     return own
 
 
-def compiled_part(emitted: Emitted, part: str, own: Mapping[str, tuple[Any, int]]) -> dict[str, Compiled]:
+def compiled_part(text: str, part: str, own: Mapping[str, tuple[Any, int]]) -> dict[str, Compiled]:
     """The compiled functions of a part of ``PARTS`` by name; ``own`` are those of ``own_functions``."""
     if not own:
-        return shared_functions(emitted.texts[part], PARTS[part])
+        return shared_functions(text, PARTS[part])
     # The user's functions have addresses of this process, so code that calls them is not cached.
     calls = {name: OwnFunction(code.address, size) for name, (code, size) in own.items()}
-    code = _code(emitted.texts[part], PARTS[part], calls)
+    code = _code(text, PARTS[part], calls)
     return load(code, PARTS[part], needs=[each for each, _ in own.values()])
 
 
-def compiled_stage(emitted: Emitted, part: str, known: dict[Any, Any], size: int) -> dict[str, Compiled]:
+def compiled_stage(text: str, part: str, known: dict[Any, Any], size: int) -> dict[str, Compiled]:
     """The compiled functions of a part, for a stage of a system that grows.
 
     Each case of a function is compiled by itself, once for all stages; ``known`` keeps them. For each name a
     stage adds a table of the ``size`` addresses of its cases, and a function that calls them by the table.
     """
     cases: dict[str, list[Case]] = {name: [NOTHING] for name in PARTS[part]}
-    for name, case in cases_in(emitted.texts[part]):
+    for name, case in cases_in(text):
         cases[name].insert(-1, case)
     new = dict.fromkeys(
         (name, body) for name, each in cases.items() for _, body in each if (name, body) not in known
@@ -122,7 +125,7 @@ def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction | C
     cases: dict[str, list[Any]] = {name: [] for name in names}
     for name, (indices, body) in cases_in(source):
         cases[name].append((indices, json.loads(body)))
-    repeats = '["repeat",' in source
+    repeats = _consists_of_loops(body for each in cases.values() for _, body in each)
     kinds = {name: name.partition(CASE)[0] for name in names}
     wanted = [
         Function(
@@ -136,3 +139,24 @@ def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction | C
         for name, kind in kinds.items()
     ]
     return machine_code(wanted, calls, rare=all(kind in RARE for kind in kinds.values()))
+
+
+def _consists_of_loops(bodies: Iterable[Any]) -> bool:
+    """Whether nearly all that functions do is done in loops over statements."""
+    in_loops = straight = 0
+    rest = [statement for body in bodies for statement in body]
+    while rest:
+        statement = rest.pop()
+        inner = bodies_in(statement)
+        rest += [each for body in inner for each in body]
+        if statement[0] == "repeat":
+            _, _, turns, body = statement
+            in_loops += turns * _size(body)
+        elif not inner:
+            straight += _size(statement)
+    return in_loops > IN_LOOPS * (in_loops + straight)
+
+
+def _size(term: Any) -> int:
+    """The number of operations and places of values in a term."""
+    return 1 + sum(map(_size, term)) if isinstance(term, list) else 0

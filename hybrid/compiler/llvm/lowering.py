@@ -91,7 +91,7 @@ class Function:
     fused
         Whether multiplications and additions may be fused.
     repeats
-        Whether some of its loops consist of turns that do not wait for one another.
+        Whether it consists of loops over statements that do not wait for one another.
     body
         What writes its instructions; ``Body`` for None.
     """

@@ -155,3 +155,8 @@ def when(condition: Code, body: Sequence[Statement], other: Sequence[Statement] 
 def whole(name: str, value: int) -> Statement:
     """A name for a whole number."""
     return ("whole", name, value)
+
+
+def bodies_in(statement: Sequence[Any]) -> Sequence[Any]:
+    """The lists of statements in a loop over orders or in a branch; nothing for other statements."""
+    return {"for": statement[5:], "when": statement[2:]}.get(statement[0], ())

@@ -16,7 +16,7 @@ from typing import Any
 
 import attrs
 
-from hybrid.compiler.statements.code import KNOWN, Code, Statement, at, call, get, put
+from hybrid.compiler.statements.code import KNOWN, Code, Statement, at, bodies_in, call, get, put
 from hybrid.compiler.statements.order import Order
 from hybrid.kernels.types.codes import NARROW
 
@@ -55,7 +55,7 @@ def rolled(statements: Sequence[Statement]) -> Sequence[Statement]:
 def _simple(statements: Iterable[Statement]) -> Iterator[Statement]:
     """All statements but loops and branches, also those in them."""
     for statement in statements:
-        bodies = _bodies(statement)
+        bodies = bodies_in(statement)
         if not bodies:
             yield statement
         for body in bodies:
@@ -138,7 +138,7 @@ class _Roller:
                 continue
             plan += self._grouped(straight)
             straight = []
-            bodies = _bodies(statement)
+            bodies = bodies_in(statement)
             plan.append((statement, *map(self.planned, bodies)) if bodies else statement)
         return plan + self._grouped(straight)
 
@@ -328,10 +328,6 @@ def _is_straight(statement: Statement) -> bool:
     if statement[0] == "set":
         return True
     return statement[0] == "do" and statement[1][0] == "store"
-
-
-def _bodies(statement: Statement) -> Sequence[Any]:
-    return {"for": statement[5:], "when": statement[2:]}.get(statement[0], ())
 
 
 def _names_set(statement: Statement) -> list[str]:

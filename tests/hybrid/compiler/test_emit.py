@@ -4,13 +4,16 @@ import os
 import subprocess
 import sys
 
+import attrs
 import numpy as np
 import pytest
 
+import models
+from hybrid import Table, from_equations
 from hybrid.compiler.compiled import compile_system
-from hybrid.compiler.emit import emit
+from hybrid.compiler.emit import emit, text_of
 from hybrid.compiler.llvm.functions import compiled_part, own_functions
-from hybrid.compiler.parts import EVENTS, FIELDS, SLOPES
+from hybrid.compiler.parts import EVENTS, FIELDS, LATER, PARTS, SLOPES
 from hybrid.errors import ModelError
 from hybrid.kernels.types.codes import EXACT, RUNGE_KUTTA
 from hybrid.system.derivatives import sample_points
@@ -27,9 +30,9 @@ def load(emitted, *, compiled):
     if compiled:
         own = own_functions(emitted)
         functions = (
-            compiled_part(emitted, FIELDS, own)
-            | compiled_part(emitted, EVENTS, own)
-            | compiled_part(emitted, SLOPES, own)
+            compiled_part(emitted.texts[FIELDS], FIELDS, own)
+            | compiled_part(emitted.texts[EVENTS], EVENTS, own)
+            | compiled_part(emitted.texts[SLOPES], SLOPES, own)
         )
         return {name: called(function) for name, function in functions.items()}
     calls = {}
@@ -437,3 +440,18 @@ def test_guards_that_are_not_affine_have_programs():
     assert emitted.timed_reset == (False, False, False, True)
     rows = np.diff(emitted.programs.first)[:4]
     assert (rows > 0).tolist() == [False, True, False, True]
+
+
+def test_what_a_system_that_grows_leaves_out_is_written_when_a_run_asks_for_it(monkeypatch):
+    grows = models.rocking_block()
+    emitted, later = emit(grows), {part: text_of(grows, part) for part in LATER}
+    assert emitted.texts.keys() == PARTS.keys() - later.keys()
+    monkeypatch.setattr("hybrid.compiler.emit.LATER", ())
+    whole = emit(models.rocking_block())
+    assert attrs.evolve(emitted, texts=emitted.texts | later) == whole
+
+
+def test_tables_leave_nothing_out():
+    times = Table([0.0, 1.0, 3.0], [0.0, 1.0, 0.5], kind="linear")
+    rubbing = from_equations(lambda t, x, p: (x.v, times(t) - np.sign(x.v)), state=("q", "v"))
+    assert emit(rubbing).texts.keys() == PARTS.keys()

@@ -13,7 +13,7 @@ from hybrid import Guard, HybridSystem, Mode, ModelError, Reset, Transition
 from hybrid.compiler.cache import store
 from hybrid.compiler.cache.seal import sealed, unsealed
 from hybrid.compiler.cache.store import models_folder
-from hybrid.compiler.compiled import emitted_of
+from hybrid.compiler.emission import emitted_of
 from hybrid.compiler.emit import emit
 from hybrid.compiler.traced import key_of
 from hybrid.expression.ufuncs import RULES

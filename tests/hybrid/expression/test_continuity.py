@@ -8,7 +8,7 @@ import pytest
 
 import hybrid
 import models
-from hybrid.compiler.compiled import emitted_of
+from hybrid.compiler.emission import emitted_of
 from hybrid.compiler.emit import emit
 from hybrid.expression.continuity import _sides, jumps_of, may_jump, vanishes_on
 from hybrid.expression.evaluation import Program

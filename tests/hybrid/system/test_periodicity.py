@@ -18,7 +18,7 @@ from hybrid import (
     simulate,
     simulate_many,
 )
-from hybrid.compiler.compiled import emitted_of
+from hybrid.compiler.emission import emitted_of
 
 
 def forced(

@@ -290,7 +290,7 @@ def test_networks_of_two_hundred_states(shape, seed):
     [propagator], start = emitted.propagators, emitted.tangent_start
     stride = propagator.series.tangent_columns
     for part in (FIELDS, VARIATIONAL, TANGENT_SERIES):
-        compiled = {name: called(each) for name, each in compiled_part(emitted, part, {}).items()}
+        compiled = {name: called(each) for name, each in compiled_part(emitted.texts[part], part, {}).items()}
         for run in (functions_in(emitted.texts[part]), compiled):
             if part == FIELDS:
                 out, slopes = np.zeros(n), np.zeros((n, n + 1))
