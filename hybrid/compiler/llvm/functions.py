@@ -22,7 +22,7 @@ from hybrid.compiler.llvm.lowering import (
     Function,
     OwnFunction,
 )
-from hybrid.compiler.llvm.machine import machine_code
+from hybrid.compiler.llvm.machine import LOOPS, NO_LOOPS, NOTHING_BUT_LOOPS, machine_code
 from hybrid.compiler.opaque import compiled_functions
 from hybrid.compiler.parts import PARTS, SLOPES
 from hybrid.compiler.statements.code import bodies_in
@@ -50,7 +50,7 @@ SIGNATURES = {
 FUSED = ("series", "tangent_series", "series_abreast", "tangent_series_abreast")
 # What runs call once for an event, not on every step.
 RARE = PARTS[SLOPES]
-# The least share of the work in loops over statements at which passes for loops are worth their time.
+# The least share of the work in loops over statements of functions that consist of such loops.
 IN_LOOPS = 0.9
 # What writes the instructions of these functions.
 BODIES = dict.fromkeys(("series_abreast", "tangent_series_abreast"), AbreastBody)
@@ -125,7 +125,7 @@ def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction | C
     cases: dict[str, list[Any]] = {name: [] for name in names}
     for name, (indices, body) in cases_in(source):
         cases[name].append((indices, json.loads(body)))
-    repeats = _consists_of_loops(body for each in cases.values() for _, body in each)
+    loops = _loops(body for each in cases.values() for _, body in each)
     kinds = {name: name.partition(CASE)[0] for name in names}
     wanted = [
         Function(
@@ -133,7 +133,7 @@ def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction | C
             SIGNATURES.get(kind, VECTOR_SIGNATURE),
             cases[name],
             kind in FUSED,
-            repeats,
+            loops,
             BODIES.get(kind),
         )
         for name, kind in kinds.items()
@@ -141,9 +141,10 @@ def _code(source: str, names: Sequence[str], calls: Mapping[str, OwnFunction | C
     return machine_code(wanted, calls, rare=all(kind in RARE for kind in kinds.values()))
 
 
-def _consists_of_loops(bodies: Iterable[Any]) -> bool:
-    """Whether nearly all that functions do is done in loops over statements."""
+def _loops(bodies: Iterable[Any]) -> int:
+    """The level of passes for the loops of functions with these statements."""
     in_loops = straight = 0
+    level = NO_LOOPS
     rest = [statement for body in bodies for statement in body]
     while rest:
         statement = rest.pop()
@@ -152,9 +153,11 @@ def _consists_of_loops(bodies: Iterable[Any]) -> bool:
         if statement[0] == "repeat":
             _, _, turns, body = statement
             in_loops += turns * _size(body)
+        elif statement[0] == "for":
+            level = LOOPS
         elif not inner:
             straight += _size(statement)
-    return in_loops > IN_LOOPS * (in_loops + straight)
+    return NOTHING_BUT_LOOPS if in_loops > IN_LOOPS * (in_loops + straight) else level
 
 
 def _size(term: Any) -> int:

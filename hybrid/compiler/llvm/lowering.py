@@ -90,8 +90,8 @@ class Function:
         Indices, with the statements for them; a case without indices is run for every index.
     fused
         Whether multiplications and additions may be fused.
-    repeats
-        Whether it consists of loops over statements that do not wait for one another.
+    loops
+        The level of LLVM's passes for its loops (``hybrid.compiler.llvm.machine``).
     body
         What writes its instructions; ``Body`` for None.
     """
@@ -100,7 +100,7 @@ class Function:
     signature: Signature
     cases: Sequence[Any]
     fused: bool = False
-    repeats: bool = False
+    loops: int = 0
     body: Any = None
 
 

@@ -14,28 +14,31 @@ from hybrid.compiler.llvm.lowering import NO_CALLS, CaseTable, Function, OwnFunc
 # Functions with more instructions than this, as written, are emitted in haste: LLVM's time grows faster than
 # their length, and they run no slower.
 LONG = 15000
+# Levels of LLVM's passes for functions without loops, with some, and for those that consist of loops over
+# statements that do not wait for one another.
+NO_LOOPS, LOOPS, NOTHING_BUT_LOOPS = 0, 2, 3
 # Functions that runs call rarely are emitted as they are written if one has more instructions than this.
 LONG_FOR_RARE = 2000
 
 
-def _optimise(module: Any, *, repeats: bool) -> None:
-    """Run the passes that compiled functions profit from.
+def _optimise(module: Any, level: int) -> None:
+    """Run the passes that compiled functions profit from, at the level of their loops.
 
-    Their vectors are written as vectors and nothing is left to inline. So a few passes give code as fast as
-    all passes of LLVM's highest level do, in half the time. A loop that ``repeats`` statements is another
-    matter: it becomes vectors.
+    Their vectors are written as vectors and nothing is left to inline. So without loops a few passes give code
+    as fast as all passes of LLVM's highest level do, in half the time. What does not change in a loop is to
+    leave it, and loops over statements are to become vectors.
     """
-    options = binding.create_pipeline_tuning_options(speed_level=SPEED)
-    options.loop_vectorization, options.loop_unrolling, options.slp_vectorization = repeats, False, False
+    options = binding.create_pipeline_tuning_options(speed_level=level)
+    options.loop_vectorization = level == NOTHING_BUT_LOOPS
+    options.loop_unrolling, options.slp_vectorization = False, False
     builder = binding.create_pass_builder(target(), options)
-    if repeats:
+    if level != NO_LOOPS:
         builder.getModulePassManager().run(module, builder)
         return
     passes = binding.create_new_module_pass_manager()
     passes.add_sroa_pass()
     passes.add_simplify_cfg_pass()
     passes.add_instruction_combine_pass()
-    passes.add_loop_rotate_pass()
     passes.add_new_gvn_pass()
     passes.run(module, builder)
 
@@ -64,6 +67,6 @@ def machine_code(
     if rare and longest > LONG_FOR_RARE:
         code = target(PLAIN).emit_object(parsed)
         return code
-    _optimise(parsed, repeats=any(each.repeats for each in functions))
+    _optimise(parsed, max(each.loops for each in functions))
     code = target(HASTE if longest > LONG else SPEED).emit_object(parsed)
     return code
