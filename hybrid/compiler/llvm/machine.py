@@ -11,9 +11,9 @@ from hybrid.compiler.interrupts import between_passes
 from hybrid.compiler.llvm.engine import HASTE, PLAIN, SPEED, target
 from hybrid.compiler.llvm.lowering import NO_CALLS, CaseTable, Function, OwnFunction, lower
 
-# Functions with more instructions than this, as written, are emitted in haste: LLVM's time grows faster than
-# their length, and they run no slower.
-LONG = 15000
+# Functions with more instructions than this, as written, are optimised and emitted in haste: the time of LLVM
+# grows faster than their length, and they run no slower.
+LONG = 10000
 # Levels of LLVM's passes for functions without loops, with some, and for those that consist of loops over
 # statements that do not wait for one another.
 NO_LOOPS, LOOPS, NOTHING_BUT_LOOPS = 0, 2, 3
@@ -21,18 +21,18 @@ NO_LOOPS, LOOPS, NOTHING_BUT_LOOPS = 0, 2, 3
 LONG_FOR_RARE = 2000
 
 
-def _optimise(module: Any, level: int) -> None:
-    """Run the passes that compiled functions profit from, at the level of their loops.
+def _optimise(module: Any, loops: int, level: int) -> None:
+    """Run the passes that compiled functions with such loops profit from, at most those of a level.
 
-    Their vectors are written as vectors and nothing is left to inline. So without loops a few passes give code
-    as fast as all passes of LLVM's highest level do, in half the time. What does not change in a loop is to
-    leave it, and loops over statements are to become vectors.
+    Their vectors are written as vectors and nothing is left to inline. So without loops a few passes give
+    code as fast as all passes of LLVM's highest level do, in half the time. What does not change in a loop is
+    to leave it, and loops over statements are to become vectors.
     """
-    options = binding.create_pipeline_tuning_options(speed_level=level)
-    options.loop_vectorization = level == NOTHING_BUT_LOOPS
+    options = binding.create_pipeline_tuning_options(speed_level=min(loops, level))
+    options.loop_vectorization = loops == NOTHING_BUT_LOOPS
     options.loop_unrolling, options.slp_vectorization = False, False
     builder = binding.create_pass_builder(target(), options)
-    if level != NO_LOOPS:
+    if loops != NO_LOOPS:
         builder.getModulePassManager().run(module, builder)
         return
     passes = binding.create_new_module_pass_manager()
@@ -67,6 +67,7 @@ def machine_code(
     if rare and longest > LONG_FOR_RARE:
         code = target(PLAIN).emit_object(parsed)
         return code
-    _optimise(parsed, max(each.loops for each in functions))
-    code = target(HASTE if longest > LONG else SPEED).emit_object(parsed)
+    level = HASTE if longest > LONG else SPEED
+    _optimise(parsed, max(each.loops for each in functions), level)
+    code = target(level).emit_object(parsed)
     return code
