@@ -22,9 +22,10 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-# The name of Linux with its first version of the C library that the packages below still run with.
+# Linux with a C library of 2014 or newer; wheels of the dependencies ask for a newer one.
 GLIBC = "manylinux_2_17"
-NEEDED = {"attrs", "cattrs", "llvmlite", "numba", "numpy", "platformdirs", "tqdm"}
+# What the compilation imports.
+NEEDED = {"attrs", "cattrs", "llvmlite", "numba", "numpy", "platformdirs", "scipy", "tqdm"}
 
 
 def _platform() -> str:

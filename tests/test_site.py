@@ -147,11 +147,6 @@ def test_the_index_of_tasks_leads_to_every_how_to_page_and_to_names(maker, site)
     assert maker.with_names("[`simulate`](x.md) `no_such_name`") == "[`simulate`](x.md) `no_such_name`"
 
 
-def test_the_start_page_names_this_version():
-    version = importlib.import_module("hybrid").__version__
-    assert f"version {version}" in " ".join((ROOT / "docs" / "index.md").read_text("utf-8").split())
-
-
 def test_the_page_of_a_model_has_its_parameters_with_units_and_its_script(site):
     text = (site / "models" / "bouncing_ball.md").read_text(encoding="utf-8")
     assert "| `g` | 9.81 | m/s^2 |" in text
