@@ -64,6 +64,7 @@ html_favicon = "icon.svg"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = False
+html_copy_source = False
 html_search_scorer = str(HERE / "search_scorer.js")
 html_theme_options = {
     "show_prev_next": False,
