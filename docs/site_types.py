@@ -23,15 +23,20 @@ PACKAGES = (
 SECTIONS = ("Parameters", "Other Parameters", "Attributes")
 UNDERLINE = re.compile(r"-{3,}\s*")
 NAME = re.compile(r"[A-Za-z_][\w.]*")
-# Where readers find what annotations call by a short name.
+# What readers call the things that annotations name in short, or by a class of the library's own.
 KNOWN = {
     "ArrayLike": "ArrayLike",
+    "Clock": "Every | At | After | Delay",
+    "Output": "Callable",
+    "Quantity": "float | str | Callable",
     "Axes": "matplotlib.axes.Axes",
     "Figure": "matplotlib.figure.Figure",
     "np.ndarray": "numpy.ndarray",
     "os.PathLike": "PathLike",
     "typing.Any": "Any",
 }
+# The laws that a mapping, or a list of names, has become.
+LAWS = ("tuple[Law, ...]", "Mapping[str, Any] | Iterable[str]")
 
 
 def add_types(app: Any, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
@@ -96,10 +101,13 @@ def annotations_of(thing: Any) -> dict[str, str]:
             if inspect.isfunction(function) and "return" in function.__annotations__:
                 found[name] = _shown(function.__annotations__["return"], around)
     for name, parameter in _parameters(thing).items():
-        if parameter.annotation is not parameter.empty:
-            found[name] = _shown(parameter.annotation, module)
-            if parameter.default is not parameter.empty:
-                found[name] = found[name].removesuffix(" | None") + ", optional"
+        if parameter.annotation is parameter.empty:
+            continue
+        shown = _shown(parameter.annotation, module)
+        # What a converter takes may be anything; what it makes of that says more.
+        kind = found.get(name, shown) if shown in ("Any", "object") else shown
+        has_default = parameter.default is not parameter.empty
+        found[name] = kind.removesuffix(" | None") + ", optional" if has_default else kind
     return found
 
 
@@ -114,7 +122,7 @@ def _parameters(thing: Any) -> dict[str, inspect.Parameter]:
 def _shown(annotation: Any, around: dict[str, Any]) -> str:
     """An annotation as text, in which short names of unions and functions are written out."""
     text = annotation if isinstance(annotation, str) else _text(annotation)
-    return NAME.sub(lambda name: _name(name[0], around), text)
+    return NAME.sub(lambda name: _name(name[0], around), text).replace(*LAWS)
 
 
 def _name(name: str, around: dict[str, Any]) -> str:

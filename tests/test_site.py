@@ -103,6 +103,8 @@ def test_types_are_those_of_the_annotations(types):
     simulate = types.annotations_of(importlib.import_module("hybrid").simulate)
     assert simulate["x0"] == "ArrayLike | ArcEnd"
     assert simulate["max_jumps"] == "int, optional"
+    system = types.annotations_of(importlib.import_module("hybrid").HybridSystem)
+    assert system["parameters"] == "Mapping[str, float], optional"
 
 
 def test_what_readers_look_for_is_a_keyword_of_its_page(search, site):
