@@ -113,8 +113,10 @@ def try_out(wheel: Path, folder: Path) -> None:
     """Run the calls from a wheel, as this machine does and as older processors that it has kernels for."""
     shutil.rmtree(folder, ignore_errors=True)
     packages = environment(folder, wheel)
-    text = (packages / "hybrid" / "machine_code" / "README.txt").read_text(encoding="utf-8")
-    names = re.findall(r"^(\S+): ", text, re.MULTILINE)
+    readme = packages / "hybrid" / "machine_code" / "README.txt"
+    if not readme.exists():
+        sys.exit(f"{wheel.name} contains no compiled kernels.")
+    names = re.findall(r"^(\S+): ", readme.read_text(encoding="utf-8"), re.MULTILINE)
     # This machine takes the first kernels, unless it is older itself.
     for name in ("", *names[1:]):
         cache = str(folder / f"cache-{name}")
