@@ -2,6 +2,8 @@
 #   make demo ARGS="--help"            options of the demo
 #   make test ARGS="-k statistics"     options of pytest
 #   make docs ARGS=--links             ask the sites that the documentation links to
+#   make site-zip                      the site in one file, dist/hybrid-site.zip
+#   make wheels                        what is released, in dist/
 PYTHON ?= python3
 VENV ?= .venv
 ARGS ?=
@@ -11,7 +13,7 @@ BIN := $(VENV)/bin
 PIP_INSTALL := HATCH_BUILD_NO_HOOKS=true $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 .DELETE_ON_ERROR:
-.PHONY: demo test lint docs clean
+.PHONY: demo test lint docs site-zip wheels clean
 
 demo: $(VENV)/.installed
 	$(BIN)/python -m lyapunov $(ARGS)
@@ -31,8 +33,18 @@ lint: $(VENV)/.installed-dev
 docs: $(VENV)/.installed-docs
 	$(BIN)/python docs/make_site.py $(ARGS)
 
+site-zip: docs
+	mkdir -p dist
+	cd build/site && $(abspath $(BIN)/python) -m zipfile --create $(CURDIR)/dist/hybrid-site.zip html
+
+# The sources, and a wheel of them with kernels for all processors of this machine's family; both are tried out.
+wheels: $(VENV)/.installed-release
+	rm -rf dist/hybrid_systems-*
+	HYBRID_WHEEL=family $(BIN)/python -m build --outdir dist
+	$(BIN)/python .ci/bare.py build/bare dist/hybrid_systems-*.whl
+
 clean:
-	rm -rf build $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf build dist $(VENV) .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find hybrid models lyapunov tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:

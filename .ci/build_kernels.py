@@ -1,5 +1,9 @@
 """What building a wheel does besides packing files: it compiles the kernels, so that the first run need not.
 
+By default for processors like this one, since most wheels are installed where they are built; with the
+environment variable ``HYBRID_WHEEL=family`` for the older processors of its family, too. The file
+``hybrid/machine_code/README.txt`` of a wheel says what its code is for.
+
 An editable installation is left as it is: its kernels are compiled when a run first needs them. The same
 holds for a wheel whose kernels could not be compiled, or are for a family of processors without a base.
 """
@@ -7,6 +11,7 @@ holds for a wheel whose kernels could not be compiled, or are for a family of pr
 from __future__ import annotations
 
 import os
+import platform
 import re
 import subprocess
 import sys
@@ -17,7 +22,16 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-NEEDED = {"attrs", "cattrs", "llvmlite", "numba", "numpy", "platformdirs", "tqdm"}
+# Linux with a C library of 2014 or newer; wheels of the dependencies ask for a newer one.
+GLIBC = "manylinux_2_17"
+# What the compilation imports.
+NEEDED = {"attrs", "cattrs", "llvmlite", "numba", "numpy", "platformdirs", "scipy", "tqdm"}
+
+
+def _platform() -> str:
+    """The platform in the name of a wheel: of the C library the code calls nothing but old functions."""
+    name = re.sub(r"\W", "_", sysconfig.get_platform())
+    return name.replace("linux", GLIBC, 1) if platform.libc_ver()[0] == "glibc" else name
 
 
 class Kernels(BuildHookInterface):
@@ -36,8 +50,9 @@ class Kernels(BuildHookInterface):
             return
         self._folder = tempfile.TemporaryDirectory()
         into = Path(self._folder.name) / "machine_code"
+        wanted = ["--family"] if os.environ.get("HYBRID_WHEEL") == "family" else []
         done = subprocess.run(
-            [sys.executable, "-m", "hybrid", "compile", "--portable", str(into)],
+            [sys.executable, "-m", "hybrid", "compile", "--portable", str(into), *wanted],
             cwd=self.root,
             env=os.environ | {"HYBRID_CACHE_DIR": str(into.parent / "cache")},
             check=False,
@@ -48,8 +63,7 @@ class Kernels(BuildHookInterface):
         for path in sorted(into.iterdir()):
             build_data["force_include"][str(path)] = f"hybrid/{into.name}/{path.name}"
         build_data["pure_python"] = False
-        platform = re.sub(r"\W", "_", sysconfig.get_platform())
-        build_data["tag"] = f"py3-none-{platform}"
+        build_data["tag"] = f"py3-none-{_platform()}"
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
         """Remove the compiled files, which the wheel contains now."""

@@ -1,6 +1,16 @@
 """Settings of the site: ``make docs`` builds it with ``docs/make_site.py``, which copies this file."""
 
+import sys
+from pathlib import Path
+
+from numpydoc.xref import DEFAULT_LINKS
+
 import hybrid
+
+# make_site.py copies this file and what it imports side by side.
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+from site_types import add_types, classes  # noqa: E402
 
 project = "hybrid"
 author = "The hybrid-systems developers"
@@ -34,6 +44,10 @@ nb_merge_streams = True
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
+# Types lead to the pages of the classes that they name; those of other packages have none here.
+numpydoc_xref_param_type = True
+numpydoc_xref_aliases = {word: word for word in DEFAULT_LINKS} | classes()
+numpydoc_xref_ignore = "all"
 # docs/make_site.py writes the pages of the names.
 autosummary_generate = False
 add_module_names = False
@@ -50,6 +64,8 @@ html_favicon = "icon.svg"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = False
+html_copy_source = False
+html_search_scorer = str(HERE / "search_scorer.js")
 html_theme_options = {
     "show_prev_next": False,
     "navigation_with_keys": False,
@@ -67,3 +83,5 @@ def readable_defaults(app, what, name, thing, options, signature, returned):
 
 def setup(app):
     app.connect("autodoc-process-signature", readable_defaults)
+    # Before numpydoc, whose priority is 500.
+    app.connect("autodoc-process-docstring", add_types, priority=400)

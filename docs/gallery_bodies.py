@@ -68,25 +68,29 @@ def woodpecker(ax: Axes) -> None:
     ax.set_xlabel("time (s)")
 
 
-PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
+PICTURES: list[tuple[str, str, Callable[[Axes], None], str]] = [
     (
         "newtons_cradle",
         "Newton's cradle: of touching balls all three leave the impact, with small gaps only the last one.",
         newtons_cradle,
+        "Newton's cradle, cradle",
     ),
     (
         "rocking_block",
         "A rocking block released close to the boundary of overturning, the grey curve.",
         rocking_block,
+        "rocking block, rocking, earthquake, Housner",
     ),
     (
         "shaken_stack",
         "Two boxes on a table that shakes: speeds of the three, which are the same where a box sticks.",
         shaken_stack,
+        "stack, blocks",
     ),
     (
         "woodpecker",
         "What holds at the beak and at the two edges of the sleeve while the woodpecker toy pecks twice.",
         woodpecker,
+        "woodpecker, toy",
     ),
 ]

@@ -131,47 +131,55 @@ def drive_to_the_cut_off(axes: Axes) -> None:
     axes.set(xlabel="t (s)", ylabel="u (V)")
 
 
-PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
+PICTURES: list[tuple[str, str, Callable[[Axes], None], str]] = [
     (
         "boost_converter",
         "Current at the ticks over the peak current: a period doubling, borders where ticks find the switch "
         "closed, and chaos.",
         bifurcations_of_the_boost_converter,
+        "boost converter, slope compensation",
     ),
     (
         "delayed_neurons",
         "Multipliers of two neurons that inhibit each other, computed (dots) and in closed form, over the "
         "delay of a spike.",
         multipliers_of_the_neurons,
+        "spiking neurons",
     ),
     (
         "digital_pwm",
         "Current at the samples over the gain: a period doubling, and orbits at the limits of the duty.",
         bifurcations_of_the_sampled_duty,
+        "digital PWM, quantisation",
     ),
     (
         "sampled_loop",
         "A step of the set point: the held control saturates, and leaves the limit without having wound up.",
         step_of_the_sampled_loop,
+        "anti-windup, windup",
     ),
     (
         "dosing_schedule",
         "Concentration under doses at listed times, and with the third one missed.",
         doses,
+        "tablets",
     ),
     (
         "infusion_schedule",
         "Concentration under three infusions from a table, which overlap, and the sum of their rates.",
         infusions,
+        "infusions",
     ),
     (
         "refractory_neuron",
         "Spikes counted in two seconds (dots), and the closed form of the rate, for three refractory times.",
         rates_of_the_neuron,
+        "neuron, integrate and fire",
     ),
     (
         "battery_cell",
         "Terminal voltage under a drive cycle that repeats, down to the cut-off at a peak of the current.",
         drive_to_the_cut_off,
+        "battery, state of charge",
     ),
 ]

@@ -65,20 +65,23 @@ def bouncing_ball(ax: Axes) -> None:
     ax.legend(frameon=False, fontsize=8)
 
 
-PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
+PICTURES: list[tuple[str, str, Callable[[Axes], None], str]] = [
     (
         "vibroimpact",
         "Force over penetration in one impact, for each contact law of the model.",
         vibroimpact,
+        "vibro-impact, vibroimpact",
     ),
     (
         "impact_oscillator",
         "The chaotic attractor of an oscillator at a rigid stop, with one point per forcing period.",
         impact_oscillator,
+        "impact oscillator, rigid stop",
     ),
     (
         "bouncing_ball",
         "A ball comes to rest after infinitely many bounces, where the run ends; dots mark the limits.",
         bouncing_ball,
+        "bouncing ball, ball",
     ),
 ]

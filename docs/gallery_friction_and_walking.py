@@ -141,36 +141,42 @@ def plain(ax: Axes) -> None:
     ax.spines[["top", "right"]].set_visible(False)
 
 
-PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
+PICTURES: list[tuple[str, str, Callable[[Axes], None], str]] = [
     (
         "stick_slip",
         "A block on a moving belt reaches a limit cycle of sticking and slipping from every start shown.",
         stick_slip,
+        "belt, limit cycle, brake squeal",
     ),
     (
         "coulomb_stick_slip",
         "Displacement at three belt speeds: the mass sticks up to x = 1, the static friction, then slips.",
         coulomb_stick_slip,
+        "static friction, stiction",
     ),
     (
         "dry_friction_oscillator",
         "Den Hartog's resonance curves (lines, motion without stops) and simulation (dots, stops included).",
         dry_friction_oscillator,
+        "dry friction, Den Hartog",
     ),
     (
         "rimless_wheel",
         "Two starts roll down the slope and reach the same gait; one start is too slow and rocks to rest.",
         rimless_wheel,
+        "rimless wheel, spokes",
     ),
     (
         "simplest_walker",
         "Steps of the simplest walker on steeper and steeper slopes: period doublings lead to chaos.",
         simplest_walker,
+        "passive walker, bipedal",
     ),
     (
         "slip_hopper",
         "Apex return map of a runner at one energy: running is stable where the map crosses the diagonal "
         "with a slope between -1 and 1.",
         slip_hopper,
+        "SLIP, spring-mass running, hopper",
     ),
 ]

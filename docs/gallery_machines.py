@@ -66,23 +66,26 @@ def verge_escapement(ax: Axes) -> None:
     ax.set(xlabel="angle of the wheel (teeth)", ylabel="angle of the foliot (rad)", xlim=(0.0, 2.5))
 
 
-PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
+PICTURES: list[tuple[str, str, Callable[[Axes], None], str]] = [
     (
         "cam_follower",
         "A follower leaves the cam at the critical speed (dashed): it bounces to rest in each turn, hits the "
         "cam once per turn, and chaotically.",
         cam_follower,
+        "cam, cam follower, valve train",
     ),
     (
         "slider_crank",
         "Both ends of a slider with clearance, which starts tilted, over a turn of the crank: impacts, and "
         "sliding along the walls.",
         slider_crank,
+        "slider-crank, clearance, joint clearance",
     ),
     (
         "verge_escapement",
         "The limit cycle of the oldest clock: teeth (grey) push the foliot to and fro, and recoil while it "
         "turns on.",
         verge_escapement,
+        "escapement, clockwork",
     ),
 ]

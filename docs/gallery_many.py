@@ -33,15 +33,17 @@ def firings_of_neurons(axes: Axes) -> None:
     axes.set(xlabel="t (s)", ylabel="neuron that fires")
 
 
-PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
+PICTURES: list[tuple[str, str, Callable[[Axes], None], str]] = [
     (
         "interleaved_converter",
         "Currents of four phases that take turns, and their sum (black): most of the ripple cancels.",
         currents_of_the_phases,
+        "interleaved converter, multiphase converter",
     ),
     (
         "pulse_coupled_neurons",
         "Thirty neurons, each of which raises all others when it fires, fall into step.",
         firings_of_neurons,
+        "pulse-coupled neurons, Peskin, synchronisation",
     ),
 ]

@@ -143,37 +143,43 @@ def gear_pair(ax: Axes) -> None:
     ax.set_ylabel("amplitude of $x$")
 
 
-PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
+PICTURES: list[tuple[str, str, Callable[[Axes], None], str]] = [
     (
         "bouncing_table",
         "A ball on a vibrating table: impact speeds over the acceleration, from one bounce per period "
         "through period doublings to chaos.",
         bouncing_table,
+        "bouncing table, vibrating table",
     ),
     (
         "impact_pair",
         "A mass rattling in a shaken box: phase and velocity of its chaotic impacts on the right wall.",
         impact_pair,
+        "impact pair, impact damper",
     ),
     (
         "bilinear_oscillator",
         "Bilinear oscillator with stiffnesses 1 and 50: subharmonic orbits and chaos between them.",
         bilinear_oscillator,
+        "bilinear oscillator, breathing crack",
     ),
     (
         "stop_oscillator",
         "Response of the oscillator between stops, with and without preload: the resonance bends and jumps.",
         stop_oscillator,
+        "elastic stop, preload",
     ),
     (
         "gear_pair",
         "Resonance of gears with backlash: orbits, and runs up and down in the frequency.",
         gear_pair,
+        "gear, gears, backlash, rattle",
     ),
     (
         "relief_valve",
         "Lift of a relief valve over the inflow: the equilibrium, stable to the Hopf point, and the tops of "
         "simulated motions, which flutter and hit the seat.",
         relief_valve,
+        "relief valve, valve",
     ),
 ]

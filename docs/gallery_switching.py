@@ -96,36 +96,42 @@ def scattering_by_three_disks(axes: Axes) -> None:
     axes.set(aspect="equal", xlim=(-6, 6), ylim=(-4, 5.5), xlabel="x", ylabel="y")
 
 
-PICTURES: list[tuple[str, str, Callable[[Axes], None]]] = [
+PICTURES: list[tuple[str, str, Callable[[Axes], None], str]] = [
     (
         "chua_circuit",
         "The double scroll, with one colour per affine region; crosses mark the three equilibria.",
         double_scroll,
+        "Chua, double scroll",
     ),
     (
         "buck_converter",
         "Period doublings of the output voltage at the start of each ramp, and the sudden growth at 32.3 V.",
         bifurcations_of_the_converter,
+        "buck converter, voltage mode",
     ),
     (
         "solvable_oscillator",
         "The oscillation grows about the set point s, which flips at integer times; there the states (dots) "
         "follow an exact map.",
         solvable_chaos,
+        "exactly solvable chaos",
     ),
     (
         "switched_arrival",
         "Work in the buffers: straight lines across a triangle; distances double at each switch.",
         orbit_in_the_triangle,
+        "queue, switched arrival, buffers",
     ),
     (
         "ball_chain",
         "A light ball reverses two heavy balls in 7 collisions; the bound is ceil(pi / phi) = 8.",
         rattling_ball,
+        "ball chain, inelastic collapse",
     ),
     (
         "three_disk_billiard",
         "Seven particles start within a milliradian and leave three disks in very different directions.",
         scattering_by_three_disks,
+        "billiard, billiards, scattering",
     ),
 ]

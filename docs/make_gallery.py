@@ -1,7 +1,7 @@
 """Make the gallery with one picture per model: ``python docs/make_gallery.py``.
 
-Each part ``gallery_*.py`` in this folder holds a list ``PICTURES`` of entries: name of a model, caption, and
-a function that draws on given axes.
+Each part ``gallery_*.py`` in this folder holds a list ``PICTURES`` of entries: name of a model, caption, a
+function that draws on given axes, and the words with which the search of the site finds the model.
 """
 
 from __future__ import annotations
@@ -33,11 +33,12 @@ One picture per model, drawn by [make_gallery.py](make_gallery.py). The names li
 
 
 class Picture(NamedTuple):
-    """Name of a model in `models`, caption, and drawing function."""
+    """Name of a model in `models`, caption, drawing function, and keywords."""
 
     model: str
     caption: str
     draw: Callable[[Axes], None]
+    keywords: str = ""
 
     @property
     def source(self) -> str:

@@ -21,20 +21,19 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 
 from make_gallery import Picture, pictures
 from make_published import renew
+from site_search import comment, indexed
+from site_types import PACKAGES
 
 import models
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent
-PACKAGES = (
-    *("hybrid", "lyapunov", "models"),
-    *("hybrid.measures", "hybrid.testing", "hybrid.plot", "lyapunov.plot"),
-)
 # Pages outside this folder, and their names on the site.
 OUTSIDE = {
     "benchmarks/README.md": "measurements.md",
@@ -50,7 +49,11 @@ kernelspec:
 ---
 
 """
+# Pages on which the names lead to the pages of the names.
+INDICES = ("how-to.md", "i-want-to.md", "names.md", "reference.md")
 STAGES = 3
+# A name in code, alone or with arguments, and links, in which there is no room for another one.
+NAME = re.compile(r"(?P<link>\[[^\]]*\]\([^)]*\))|`(?P<name>\w+)(?P<arguments>\([^`]*\))?`")
 LINK = re.compile(r"\]\((?!https?://|#)([^)#\s]+)(#[^)\s]*)?\)")
 
 
@@ -108,12 +111,14 @@ def build(kind: str, source: Path, into: Path, output: Path) -> int:
 def write_pages(source: Path) -> None:
     """Everything that Sphinx reads."""
     source.mkdir(parents=True)
-    for name in ("conf.py", "icon.svg"):
+    for name in ("conf.py", "site_types.py", "search_scorer.js", "icon.svg"):
         shutil.copy(HERE / name, source)
     (source / "_static").mkdir()
     shutil.copy(HERE / "site.css", source / "_static")
     for page in [*HERE.rglob("*.md"), *map(ROOT.joinpath, OUTSIDE)]:
         text = with_links(page)
+        if page.name in INDICES:
+            text = with_names(text)
         if page.name in EXECUTED:
             file = f"notebooks/{page.stem}.ipynb"
             write(source / file, json.dumps(notebook(text), indent=1))
@@ -128,7 +133,7 @@ def write_pages(source: Path) -> None:
 
 def write(path: Path, text: str) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
+    path.write_text(indexed(text) if path.suffix == ".md" else text, encoding="utf-8")
 
 
 def place(path: Path) -> Path:
@@ -153,6 +158,26 @@ def with_links(page: Path) -> str:
         return f"]({posixpath.relpath(place(target).as_posix(), here)}{link[2] or ''})"
 
     return LINK.sub(moved, page.read_text(encoding="utf-8"))
+
+
+def with_names(text: str) -> str:
+    """A page in which public names lead to their pages."""
+
+    def led(found: re.Match[str]) -> str:
+        page = page_of(found["name"]) if found["name"] else None
+        return f"[{found[0]}]({page})" if page else found[0]
+
+    return NAME.sub(led, text)
+
+
+@cache
+def page_of(name: str) -> str | None:
+    """The page of a public name; None if there is no such name."""
+    for package in PACKAGES:
+        if name in public_names(package):
+            # The gallery has the pages of the models.
+            return f"models/{name}.md" if package == "models" else f"api/{package}.{name}.md"
+    return None
 
 
 def as_notebook(text: str) -> str:
@@ -193,6 +218,8 @@ def write_models(source: Path) -> None:
 
 GALLERY = """# Gallery
 
+<!-- keywords: gallery, model, models, example, examples, demo -->
+
 One card per model. Its page has equations, parameters with units, known facts and the script of the picture.
 
 ::::{{grid}} 1 2 3 3
@@ -228,6 +255,7 @@ def model_page(picture: Picture) -> str:
         [
             f"# {picture.model}",
             "",
+            comment(picture.keywords),
             picture.caption,
             "",
             f"![{picture.caption}](../gallery/{picture.model}.png)",
@@ -255,7 +283,7 @@ def write_names(source: Path) -> None:
     parts = []
     for package in PACKAGES:
         module = importlib.import_module(package)
-        names = sorted(module.__all__, key=str.lower) if hasattr(module, "__all__") else []
+        names = sorted(public_names(package), key=str.lower)
         pages: list[str] = []
         lines = [f"## {package}", "", first_sentence(module), "", "| name | |", "|---|---|"]
         for name in names:
@@ -269,6 +297,13 @@ def write_names(source: Path) -> None:
         contents = "\n".join(pages)
         parts.append("\n".join(lines) + f"\n\n```{{toctree}}\n:hidden:\n\n{contents}\n```\n")
     write(source / "api.md", "# Every public name\n\n" + "\n".join(parts))
+
+
+def public_names(package: str) -> list[str]:
+    """The names of a package that have a page: what it exports, and functions that are imported on demand."""
+    module = importlib.import_module(package)
+    on_demand = getattr(module, "ON_DEMAND", {})
+    return [*module.__all__, *(name for name in on_demand if inspect.isroutine(getattr(module, name)))]
 
 
 def first_sentence(thing: object) -> str:

@@ -67,7 +67,7 @@ from hybrid.transform.mechanics import mechanics
 from hybrid.transform.pairs.pair import Pair
 from hybrid.transform.split import from_equations, split
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 __all__ = [
     "DOP853",

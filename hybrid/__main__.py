@@ -1,12 +1,14 @@
 """Commands: ``python -m hybrid compile`` and ``python -m hybrid explore MODULE:MODEL``.
 
 ``compile`` compiles the kernels in advance, so that the first run does not wait; with ``--portable FOLDER``
-for all processors of the family, as a wheel contains them. ``explore`` opens a page to play with a model.
+for all processors like this one, as a wheel contains them, and with ``--family`` for older ones, too.
+``explore`` opens a page to play with a model.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import platform
 import subprocess
 import sys
@@ -49,7 +51,12 @@ def parser() -> argparse.ArgumentParser:
         "--portable",
         type=Path,
         metavar="FOLDER",
-        help="compile for all processors of this machine's family, into this folder",
+        help="compile for all processors that have the usual instructions of this one, into this folder",
+    )
+    compiling.add_argument(
+        "--family",
+        action="store_true",
+        help="with --portable, compile for older processors of this machine's family, too",
     )
     add_options(commands.add_parser("explore", help="open a page to play with a model in the browser"))
     return options
@@ -60,25 +67,32 @@ def compile_kernels(processes: int) -> list[str]:
     return _compile(processes, is_kept, [IN_ANOTHER_PROCESS], {})
 
 
-def compile_portable(processes: int, folder: Path) -> list[str]:
-    """Compile every kernel for all processors of this machine's family; returns those that failed.
+def compile_portable(processes: int, folder: Path, family: bool = False) -> list[str]:
+    """Compile every kernel for many processors, and write what the files are for; returns those that failed.
 
     Raises
     ------
     ValueError
-        If no base is known for the family.
+        If no base is known for this machine.
     """
-    base = shipped.base()
-    if base is None:
+    here = shipped.base()
+    bases = shipped.bases() if family else (here,) if here else ()
+    if not bases:
         raise ValueError(
-            f"Portable kernels are compiled for {', '.join(shipped.BASES)}; this is {platform.machine()}."
+            f"Portable kernels are compiled for {', '.join(shipped.BASES)}; this is {platform.machine()}, "
+            f"and HYBRID_CPU is {os.environ.get('HYBRID_CPU', '')!r}."
         )
-    return _compile(
-        processes,
-        lambda module: portable(module, folder).exists(),
-        [PORTABLE, str(folder.absolute())],
-        base.environment(),
-    )
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "README.txt").write_text(shipped.description(bases), encoding="utf-8")
+    failed = [_compile_for(base, processes, folder) for base in bases]
+    return sorted({module for each in failed for module in each})
+
+
+def _compile_for(base: shipped.Base, processes: int, folder: Path) -> list[str]:
+    def is_done(module: str) -> bool:
+        return portable(module, folder, base).exists()
+
+    return _compile(processes, is_done, [PORTABLE, str(folder.absolute())], base.environment())
 
 
 def _compile(
@@ -123,7 +137,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         failed = compile_kernels(given.processes)
     else:
         try:
-            failed = compile_portable(given.processes, given.portable)
+            failed = compile_portable(given.processes, given.portable, given.family)
         except ValueError as error:
             print(f"hybrid: {error}", file=sys.stderr)
             return 1

@@ -80,7 +80,7 @@ def chart(
     ----------
     system
         The model.
-    over
+    over : Mapping[str, ArrayLike] | Sequence[Mapping[str, float]] | xarray.Dataset
         ``{"omega": values, "e": values}`` for a grid of any number of axes, of which the last varies fastest;
         or a table of points, as for :func:`hybrid.sweep`. A name is that of a parameter, or of a component
         of the state: the row then starts there.

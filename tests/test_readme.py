@@ -159,6 +159,9 @@ def test_what_is_cited_is_this_version():
     assert f"\nversion: {hybrid.__version__}\n" in citation
     [page] = re.findall(r"docs/\w+\.md", citation)
     assert f"`hybrid-systems {hybrid.__version__}`" in (ROOT / page).read_text(encoding="utf-8")
+    assert f"\n## [{hybrid.__version__}] - " in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    for page in ("README.md", "docs/index.md"):
+        assert f"This is version {hybrid.__version__}" in " ".join((ROOT / page).read_text("utf-8").split())
 
 
 def test_the_tests_to_read_first_are_there():

@@ -10,9 +10,7 @@ import attrs
 import numpy as np
 
 from hybrid.plot.apart import CurveLabel, keep_apart, keep_inside, lay_out, point_on
-from hybrid.plot.axes import (
-    axes_for,
-)
+from hybrid.plot.axes import axes_for
 from hybrid.plot.legends import room, wrapped
 from hybrid.plot.picture import Look, picture
 from hybrid.plot.styles import colour_of, line_width, small_text, text_size
@@ -23,6 +21,7 @@ from hybrid.system.members import about_all, shared_name
 if TYPE_CHECKING:
     import networkx as nx
     from matplotlib.axes import Axes
+    from matplotlib.text import Annotation
 
 # Arrows for the direction of a guard.
 DIRECTIONS = {-1: "↓", 0: "↕", 1: "↑"}
@@ -72,7 +71,8 @@ def plot_graph(system: HybridSystem, **look: Unpack[Look]) -> Axes:
 
     graph = as_system("system", system).graph
     crowd = len(graph)
-    (ax,) = axes_for(look, 1, SIZES[min(crowd, len(SIZES)) - 1])
+    edges, loops = _edges_and_loops(system)
+    (ax,) = axes_for(look, 1, _size(crowd, loops))
     where = _places(graph)
     boxes = {
         mode: _draw_mode(ax, mode, where[mode], colour_of(system.mode_index(mode)))
@@ -80,7 +80,6 @@ def plot_graph(system: HybridSystem, **look: Unpack[Look]) -> Axes:
     }
     if END in graph:
         boxes[END] = _draw_end(ax, where[END])
-    edges, loops = _edges_and_loops(system)
     parallel: Counter[tuple[str, str]] = Counter()
     labels: list[CurveLabel] = []
     for ends, bundle in _bundles(edges, crowd):
@@ -100,7 +99,9 @@ def plot_graph(system: HybridSystem, **look: Unpack[Look]) -> Axes:
         middle = np.degrees(np.arctan2(outward[1], outward[0]))
         for slot, edge in enumerate(around):
             angle = middle + FAN * (slot - (len(around) - 1) / 2)
-            _draw_loop(ax, edge, where[mode], np.radians(angle))
+            note = _draw_loop(ax, edge, where[mode], np.radians(angle))
+            # A single mode stays in the middle, where the key has room: long labels do not push it aside.
+            note.set_in_layout(crowd > 1)
     _frame(ax, np.array(list(where.values())), bool(loops))
     _write_key(ax, system)
     moved = [label.text for label in labels]
@@ -110,6 +111,12 @@ def plot_graph(system: HybridSystem, **look: Unpack[Look]) -> Axes:
     keep_inside(ax, [each for each in fixed if isinstance(each, Annotation)])
     keep_apart(ax, labels, fixed)
     return ax
+
+
+def _size(crowd: int, loops: Mapping[str, Sequence[_Edge]]) -> tuple[float, float]:
+    """The size of a figure, in inches: a single mode with many loops has labels on both sides."""
+    about_one = crowd == 1 and any(len(around) > 2 for around in loops.values())
+    return SIZES[1] if about_one else SIZES[min(crowd, len(SIZES)) - 1]
 
 
 @attrs.frozen
@@ -145,7 +152,10 @@ class _Edge:
         if short and name.startswith(f"{transition.source}->{transition.target}"):
             return fires
         name = name.removeprefix(f"{transition.source}: ")
-        return f"{name} {fires}" if clock is None else f"{name} ({fires})"
+        if clock is None:
+            return f"{name} {fires}"
+        # When a clock ticks may be a long text, and loops leave little room beside them.
+        return f"{name}\n({fires})" if self.ends[0] == self.ends[1] else f"{name} ({fires})"
 
     @property
     def style(self) -> dict[str, Any]:
@@ -261,8 +271,8 @@ def _write_key(ax: Axes, system: HybridSystem) -> None:
     text.set_text(wrapped(text.get_text(), text.get_window_extent().width, room(ax)))
 
 
-def _draw_loop(ax: Axes, edge: _Edge, place: np.ndarray, angle: float) -> None:
-    """A loop of fixed size, in points, that leaves and enters the box on the side at ``angle``."""
+def _draw_loop(ax: Axes, edge: _Edge, place: np.ndarray, angle: float) -> Annotation:
+    """A loop of fixed size, in points, that leaves and enters the box on the side at ``angle``; its label."""
     from matplotlib.patches import FancyArrowPatch
     from matplotlib.path import Path
     from matplotlib.transforms import Affine2D, ScaledTranslation
@@ -286,7 +296,7 @@ def _draw_loop(ax: Axes, edge: _Edge, place: np.ndarray, angle: float) -> None:
     patch = FancyArrowPatch(path=path, **edge.style, zorder=2, clip_on=False)
     patch.set_transform(points + ScaledTranslation(place[0], place[1], ax.transData))  # type: ignore[arg-type]
     ax.add_patch(patch)
-    ax.annotate(
+    return ax.annotate(
         edge.label(),
         xy=tuple(place),
         xytext=tuple((far - 6) * out),

@@ -46,14 +46,14 @@ def sweep(
         Function of a mapping of names to numbers. It returns a mapping of names to numbers, arrays or texts,
         or an ``xarray.Dataset``; names, shapes and labels must be the same at all points. A value
         ``"status"`` that is a :class:`hybrid.Status` becomes the status of the point.
-    over
+    over : Mapping[str, ArrayLike] | Sequence[Mapping[str, float]] | xarray.Dataset
         ``{"omega": values, "e": values}`` for a grid of any number of axes, of which the last varies fastest;
         a list of mappings, or an ``xarray.Dataset`` of one dimension, for a table of points. Values with
         attributes (``xarray.DataArray``), such as units, keep them.
     store
         Folder of a store, for instance ``"run.zarr"``. Results are written as they are made, and the same
         call again computes only the points that the store lacks. Needs the extra ``grid``.
-    executor
+    executor : int | Executor | Client, optional
         By default threads on all cores; a number of threads; a ``concurrent.futures.Executor``; or a
         ``dask.distributed.Client``, which needs the extra ``grid``. Workers that see the folder of the store
         write there themselves.

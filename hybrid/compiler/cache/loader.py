@@ -224,9 +224,9 @@ def is_shipped(module: str) -> bool:
     return shipped.is_shipped(module, sources_key(module))
 
 
-def portable(module: str, folder: Path) -> Path:
-    """Path in ``folder`` of a module's kernels that were compiled to be shipped."""
-    return shipped.path_in(folder, module, sources_key(module))
+def portable(module: str, folder: Path, base: shipped.Base | None = None) -> Path:
+    """Path in ``folder`` of a module's kernels that are to be shipped, by default for this machine."""
+    return shipped.path_in(folder, module, sources_key(module), base)
 
 
 def sources_in(folder: Path) -> list[Path]:

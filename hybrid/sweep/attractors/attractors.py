@@ -77,7 +77,7 @@ def attractors(
     ----------
     system, mode, parameters, solver
         As for :func:`hybrid.simulate`.
-    over
+    over : Mapping[str, float | tuple[float, float] | ArrayLike]
         For each component of the state a number, a range ``(low, high)``, or an array of values to draw from.
         Held components and counters may be left out: they are 0 then.
     t0
@@ -98,13 +98,13 @@ def attractors(
     tolerance
         Two states are near each other if no component differs by more than this share of the distance by
         which it changes along the attractor's orbit. Features do not need it.
-    features
+    features : Callable | Sequence[Callable] | Mapping[str, Callable], optional
         What tells attractors apart in place of their points: a function of an arc that gives one number, such
         as ``maximum("x")`` of `hybrid.measures`; several such functions; or a mapping of names to them.
     together
         The widest gap in a feature that a group of runs may have, in the unit of the feature: a number, or a
         mapping of each feature to one. By default the runs tell it.
-    executor
+    executor : int, optional
         Number of threads; by default all cores.
     progress
         Whether to show a progress bar; by default in a terminal or a notebook, after two seconds.

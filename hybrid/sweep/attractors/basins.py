@@ -79,7 +79,7 @@ def basins(
         As for :func:`hybrid.attractors`.
     solver
         As for :func:`hybrid.simulate`.
-    over
+    over : Mapping[str, float | tuple[float, float] | ArrayLike]
         For each component of the state a number, which all starts have; an array of values; or a range
         ``(low, high)``, of which 100 values are taken. Each array or range is an axis of the grid. Held
         components and counters may be left out: they are 0 then.

@@ -84,7 +84,7 @@ def basin_fractions(
         As for :func:`hybrid.attractors`.
     solver
         As for :func:`hybrid.simulate`.
-    over
+    over : Mapping[str, float | tuple[float, float] | ArrayLike]
         For each component of the state a number, a range ``(low, high)``, or an array of values to draw from.
         Held components and counters may be left out: they are 0 then.
     along

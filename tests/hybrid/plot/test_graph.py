@@ -233,7 +233,9 @@ def test_the_label_of_a_clock_says_when_it_ticks():
     assert [label.get_text() for label in rows.get_yticklabels()][:1] == ["tick (every T)"]
 
 
-@pytest.mark.parametrize("model", [models.stick_slip, models.boost_converter, models.chua_circuit])
+@pytest.mark.parametrize(
+    "model", [models.stick_slip, models.boost_converter, models.chua_circuit, models.delayed_neurons]
+)
 @pytest.mark.parametrize("chosen", [None, "paper"])
 def test_labels_of_edges_are_apart_and_on_the_figure(model, chosen):
     assert illegible(plot_graph(model(), style=chosen).figure) == []
