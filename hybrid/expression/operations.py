@@ -1,9 +1,10 @@
 """The functions that expressions are made of, each with all that is known of it: one class per function.
 
-``numpy`` is its value, ``code`` its name in generated code, ``word`` that in texts, ``bounds`` its number in
-interval programs. ``slopes`` are its derivatives in its arguments, ``range`` holds its values, and ``parity``
-says whether it is even (1) or odd (-1). ``in_other_terms`` expresses it by functions with series; with
-``by_derivative`` its series is the integral of its slope's.
+``numpy`` is its value; if that is a universal function, models may call it. ``code`` is its name in generated
+code, ``word`` that in texts, ``bounds`` its number in interval programs. ``slopes`` are its derivatives in
+its arguments, ``range`` holds its values, and ``parity`` says whether it is even (1) or odd (-1).
+``in_other_terms`` expresses it by functions with series; with ``by_derivative`` its series is the integral of
+its slope's.
 """
 
 # ruff: noqa: D102 - methods that override others are explained there
@@ -39,7 +40,7 @@ from hybrid.expression.ranges import (
     exponential,
     extreme,
 )
-from hybrid.expression.vocabulary import named
+from hybrid.expression.vocabulary import Special
 from hybrid.kernels.arithmetic import operations as op
 
 
@@ -51,7 +52,11 @@ def _zero(*args: Expression) -> Expression:
     return ZERO
 
 
-class Exp(RealFunction):
+class OfNumber(RealFunction):
+    """A function whose argument and value are numbers without a unit."""
+
+
+class Exp(OfNumber):
     """``e**u``."""
 
     is_exponential = True
@@ -63,14 +68,14 @@ class Exp(RealFunction):
         return Exp(exponent * self.args[0])
 
 
-class Expm1(RealFunction):
+class Expm1(OfNumber):
     """``e**u - 1``."""
 
     numpy, code, bounds, by_derivative = np.expm1, "expm1", op.EXPM1, True
     slopes = (lambda u: Exp(u),)
 
 
-class Exp2(RealFunction):
+class Exp2(OfNumber):
     """``2**u``."""
 
     numpy, range = np.exp2, _always(POSITIVE)
@@ -78,21 +83,21 @@ class Exp2(RealFunction):
     slopes = (lambda u: number(math.log(2.0)) * Exp2(u),)
 
 
-class Log(RealFunction):
+class Log(OfNumber):
     """The natural logarithm."""
 
     numpy, code, bounds, by_derivative = np.log, "log", op.LOG, True
     slopes = (lambda u: 1 / u,)
 
 
-class Log1p(RealFunction):
+class Log1p(OfNumber):
     """``log(1 + u)``."""
 
     numpy, code, bounds, by_derivative = np.log1p, "log1p", op.LOG1P, True
     slopes = (lambda u: 1 / (1 + u),)
 
 
-class Log2(RealFunction):
+class Log2(OfNumber):
     """The logarithm to the base 2."""
 
     numpy, code = np.log2, "log2"
@@ -100,7 +105,7 @@ class Log2(RealFunction):
     slopes = (lambda u: 1 / (number(math.log(2.0)) * u),)
 
 
-class Log10(RealFunction):
+class Log10(OfNumber):
     """The logarithm to the base 10."""
 
     numpy, code = np.log10, "log10"
@@ -108,7 +113,7 @@ class Log10(RealFunction):
     slopes = (lambda u: 1 / (number(math.log(10.0)) * u),)
 
 
-class Sin(RealFunction):
+class Sin(OfNumber):
     """The sine."""
 
     numpy, code, bounds = np.sin, "sin", op.SIN
@@ -116,7 +121,7 @@ class Sin(RealFunction):
     slopes = (lambda u: Cos(u),)
 
 
-class Cos(RealFunction):
+class Cos(OfNumber):
     """The cosine."""
 
     numpy, code, bounds = np.cos, "cos", op.COS
@@ -124,14 +129,14 @@ class Cos(RealFunction):
     slopes = (lambda u: -Sin(u),)
 
 
-class Tan(RealFunction):
+class Tan(OfNumber):
     """The tangent."""
 
     numpy, code, bounds, parity = np.tan, "tan", op.TAN, -1
     slopes = (lambda u: 1 + power(Tan(u), TWO),)
 
 
-class Arcsin(RealFunction):
+class Arcsin(OfNumber):
     """The arc sine."""
 
     numpy, code, bounds, by_derivative = np.arcsin, "asin", op.ASIN, True
@@ -139,7 +144,7 @@ class Arcsin(RealFunction):
     slopes = (lambda u: 1 / sqrt(1 - power(u, TWO)),)
 
 
-class Arccos(RealFunction):
+class Arccos(OfNumber):
     """The arc cosine."""
 
     numpy, code, bounds, by_derivative = np.arccos, "acos", op.ACOS, True
@@ -147,7 +152,7 @@ class Arccos(RealFunction):
     slopes = (lambda u: -1 / sqrt(1 - power(u, TWO)),)
 
 
-class Arctan(RealFunction):
+class Arctan(OfNumber):
     """The arc tangent."""
 
     numpy, code, bounds, by_derivative = np.arctan, "atan", op.ATAN, True
@@ -155,14 +160,14 @@ class Arctan(RealFunction):
     slopes = (lambda u: 1 / (1 + power(u, TWO)),)
 
 
-class Sinh(RealFunction):
+class Sinh(OfNumber):
     """The hyperbolic sine."""
 
     numpy, code, bounds, parity = np.sinh, "sinh", op.SINH, -1
     slopes = (lambda u: Cosh(u),)
 
 
-class Cosh(RealFunction):
+class Cosh(OfNumber):
     """The hyperbolic cosine."""
 
     numpy, code, bounds = np.cosh, "cosh", op.COSH
@@ -170,7 +175,7 @@ class Cosh(RealFunction):
     slopes = (lambda u: Sinh(u),)
 
 
-class Tanh(RealFunction):
+class Tanh(OfNumber):
     """The hyperbolic tangent."""
 
     numpy, code, bounds = np.tanh, "tanh", op.TANH
@@ -178,14 +183,14 @@ class Tanh(RealFunction):
     slopes = (lambda u: 1 - power(Tanh(u), TWO),)
 
 
-class Arcsinh(RealFunction):
+class Arcsinh(OfNumber):
     """The inverse of the hyperbolic sine."""
 
     numpy, code, bounds, parity, by_derivative = np.arcsinh, "asinh", op.ASINH, -1, True
     slopes = (lambda u: 1 / sqrt(power(u, TWO) + 1),)
 
 
-class Arccosh(RealFunction):
+class Arccosh(OfNumber):
     """The inverse of the hyperbolic cosine."""
 
     numpy, code, bounds, by_derivative = np.arccosh, "acosh", op.ACOSH, True
@@ -193,27 +198,26 @@ class Arccosh(RealFunction):
     slopes = (lambda u: 1 / (sqrt(u - 1) * sqrt(u + 1)),)
 
 
-class Arctanh(RealFunction):
+class Arctanh(OfNumber):
     """The inverse of the hyperbolic tangent."""
 
     numpy, code, bounds, parity, by_derivative = np.arctanh, "atanh", op.ATANH, -1, True
     slopes = (lambda u: 1 / (1 - power(u, TWO)),)
 
 
-class Erf(RealFunction):
+class Erf(OfNumber):
     """The error function."""
 
-    # SciPy is imported when there is a number to compute.
-    numpy = staticmethod(lambda u: named("erf")(u))
+    numpy = Special("erf")
     code, bounds, by_derivative = "erf", op.ERF, True
     parity, range = -1, _always(closed(-1.0, 1.0))
     slopes = (lambda u: number(2.0 / math.sqrt(math.pi)) * Exp(-power(u, TWO)),)
 
 
-class Erfc(RealFunction):
+class Erfc(OfNumber):
     """One less the error function, with all digits where that is small."""
 
-    numpy = staticmethod(lambda u: named("erfc")(u))
+    numpy = Special("erfc")
     code, bounds, by_derivative = "erfc", op.ERFC, True
     range = _always(closed(0.0, 2.0))
     slopes = (lambda u: -Erf(u).slope(),)
@@ -478,6 +482,9 @@ class Several(Function):
     """Several expressions side by side; no value of its own."""
 
 
+FUNCTIONS = tuple(
+    each for each in [*vars().values()] if isinstance(each, type) and issubclass(each, RealFunction)
+)
 # Functions whose derivative does not show their jumps: a constant derivative proves nothing about them.
 JUMPING = (PiecewiseConstant, Remainder, TruncatedRemainder)
 

@@ -24,6 +24,7 @@ from hybrid.expression.branches import refused_branch
 from hybrid.expression.nodes import Expression
 from hybrid.expression.pieces import Pieces, items, lines
 from hybrid.expression.text import text
+from hybrid.expression.ufuncs import UFUNCS
 from hybrid.expression.vocabulary import (
     BITWISE,
     CONTRACTIONS,
@@ -38,7 +39,6 @@ from hybrid.expression.vocabulary import (
     OF_TRUTHS,
     REDUCTIONS,
     TRUTHS,
-    UFUNCS,
     WHERE,
     named,
 )

@@ -2,24 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-# Those of scipy.special that can be traced.
-SPECIAL = frozenset({"erf", "erfc"})
-# The universal functions that can be traced; ``hybrid.expression.ufuncs`` has a rule for each.
-UFUNCS = frozenset(
-    {
-        "add", "subtract", "multiply", "divide", "floor_divide", "remainder", "fmod", "power", "float_power",
-        "negative", "positive", "absolute", "fabs", "sign", "square", "reciprocal", "sqrt", "cbrt", "exp",
-        "exp2", "expm1", "log", "log2", "log10", "log1p", "sin", "cos", "tan", "arcsin", "arccos", "arctan",
-        "arctan2", "sinh", "cosh", "tanh", "arcsinh", "arccosh", "arctanh", "hypot", "deg2rad", "radians",
-        "rad2deg", "degrees", "floor", "ceil", "trunc", "maximum", "minimum", "fmax", "fmin", "clip",
-        "heaviside", "less", "less_equal", "greater", "greater_equal", "equal", "not_equal", "logical_and",
-        "logical_or", "logical_xor", "logical_not", "conjugate", "rint", *SPECIAL,
-    }
-)  # fmt: skip
 # Those that give booleans, whatever their arguments.
 TRUTHS = frozenset(
     {
@@ -69,9 +55,23 @@ FOREIGN = (
 CONTRACTIONS = ("matmul", "vecdot", "matvec", "vecmat")
 
 
+class Special:
+    """A function of ``scipy.special``, which is imported when there is a number to compute."""
+
+    names: ClassVar[set[str]] = set()
+
+    def __init__(self, name: str) -> None:
+        self.__name__ = name
+        self.names.add(name)
+
+    def __call__(self, *values: Any) -> Any:
+        """The value at numbers."""
+        return named(self.__name__)(*values)
+
+
 def named(name: str) -> Any:
-    """The universal function of that name, of scipy.special or else of NumPy; None if there is none."""
-    if name not in SPECIAL:
+    """The universal function of that name, of NumPy or a `Special` one; None if there is none."""
+    if name not in Special.names:
         return getattr(np, name, None)
     import scipy.special
 

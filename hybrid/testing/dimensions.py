@@ -13,6 +13,7 @@ import attrs
 import numpy as np
 
 from hybrid.display.tables import NO_UNIT
+from hybrid.expression.operations import FUNCTIONS, OfNumber
 from hybrid.expression.values import values_of
 from hybrid.expression.vocabulary import TRUTHS, WHERE, named
 from hybrid.system.functions import CONDITION
@@ -47,10 +48,7 @@ ALIKE = {
     **{name: f"{name} of {{0}} and {{1}}" for name in ("maximum", "minimum", "fmax", "fmin")},
     **dict.fromkeys((name for name in TRUTHS if "logical" not in name), "{0} is compared with {1}"),
 }
-OF_NUMBERS = {
-    "exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "sin", "cos", "tan", "arcsin", "arccos",
-    "arctan", "sinh", "cosh", "tanh", "arcsinh", "arccosh", "arctanh", "erf", "erfc",
-}  # fmt: skip
+OF_NUMBERS = {each.numpy.__name__ for each in FUNCTIONS if OfNumber in each.__bases__}
 GIVING_NUMBERS = {"arctan2", "sign", "heaviside"} | OF_NUMBERS | TRUTHS
 KEEPING = {"negative", "positive", "absolute", "fabs", "conjugate", "floor", "ceil", "trunc", "rint"}
 POWERS = {"square": 2.0, "sqrt": 0.5, "cbrt": 1.0 / 3.0, "reciprocal": -1.0}

@@ -21,6 +21,7 @@ from hybrid.compiler.llvm.columns import (
 from hybrid.compiler.llvm.doubled import write_divided_dot_product
 from hybrid.compiler.llvm.registers import four, write_down, write_row
 from hybrid.compiler.llvm.waves import sine
+from hybrid.expression.operations import FUNCTIONS
 from hybrid.kernels.instructions.loops import declared
 from hybrid.kernels.instructions.registers import everywhere, read, vector_of, write
 from hybrid.kernels.types.codes import HEAD, NARROW
@@ -146,14 +147,11 @@ def _wave(name: str) -> Call:
     return Call(write, on_numbers=True)
 
 
-IN_LIBM = (
-    "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cosh", "erf", "erfc", "expm1", "hypot",
-    "log1p", "sinh", "tan", "tanh",
-)  # fmt: skip
 IN_LLVM = ("copysign", "exp", "log", "log10", "log2", "pow", "sqrt")
 
 CALLS = {
-    **{name: _of_libm(name) for name in IN_LIBM},
+    # Functions of models are those of the C library, unless there is something better below.
+    **{each.code: _of_libm(each.code) for each in FUNCTIONS if each.code},
     **{name: _of_llvm(name) for name in IN_LLVM},
     **{f"np.{name}": _of_llvm(name) for name in ("floor", "ceil", "trunc", "rint")},
     "sin": _wave("sine"),

@@ -16,8 +16,6 @@ from hybrid.compiler.cache.store import models_folder
 from hybrid.compiler.emission import emitted_of
 from hybrid.compiler.emit import emit
 from hybrid.compiler.traced import key_of
-from hybrid.expression.ufuncs import RULES
-from hybrid.expression.vocabulary import UFUNCS, WHERE
 
 MODELS = [
     models.ball_chain,
@@ -91,10 +89,6 @@ def test_what_is_kept_is_what_was_emitted(model, emissions):
         type(each) for each in attrs.astuple(first, recurse=False)
     ]
     assert all(type(row) is tuple for row in again.programs.rows)
-
-
-def test_every_function_has_a_rule():
-    assert {*UFUNCS, WHERE} == RULES.keys()
 
 
 def test_closures():

@@ -48,7 +48,7 @@ OTHERS = {
 DOMAINS = {**ANALYTIC, **OTHERS}
 KINDS = [*DOMAINS]
 # Classes that stand for several functions, or for none.
-BASES = {ops.RealFunction, ops.PiecewiseConstant, ops.Truth, ops.Extreme, ops.Several}
+BASES = {ops.RealFunction, ops.OfNumber, ops.PiecewiseConstant, ops.Truth, ops.Extreme, ops.Several}
 _bound = bounds.bound_guard
 SYMBOLS = model_symbols(3, 0)
 PLACES, STEP, ORDER = 40, 1e-6, 6

@@ -13,7 +13,8 @@ from hybrid.compiler.bounds.forcing import FACTORS_OF_HARMONIC, MOST_FACTORS, is
 from hybrid.expression.nodes import add, multiply
 from hybrid.expression.operations import Cos
 from hybrid.expression.tracing import model_symbols, trace
-from hybrid.expression.vocabulary import UFUNCS, named
+from hybrid.expression.ufuncs import UFUNCS
+from hybrid.expression.vocabulary import named
 
 SOLVERS = (Taylor(), DOP853(), RadauIIA(rtol=1e-8, atol=1e-10), Tsit5(rtol=1e-8, atol=1e-10))
 T = model_symbols(1, 0).t
