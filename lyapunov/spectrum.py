@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from html import escape
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 import attrs
 import numpy as np
@@ -24,16 +24,17 @@ from hybrid.display.progress import Progress, progress_bar
 from hybrid.display.tables import counted, html_table
 from hybrid.kernels.types import codes
 from hybrid.kernels.types.entries import COUNTERS
+from hybrid.shared import shares
 from hybrid.simulation.ending import has_tangents, status_of
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.pace import time_scale
 from hybrid.simulation.periods import check_time
-from hybrid.simulation.trajectory import Trajectory, start
-from hybrid.solvers import Solver
+from hybrid.simulation.trajectory import Trajectory
 from hybrid.status import SUCCESS
 from hybrid.system.growth import growing
 from hybrid.transform.aged import least_dimension, original_of, without_age
+from lyapunov.asked import Averaging, begun, numbers_of
 from lyapunov.batches import EMPTY, closed_batch_means
 from lyapunov.directions import (
     first_vectors,
@@ -188,20 +189,15 @@ class LyapunovSpectrum:
 
 
 @growing
+@shares(Averaging)
 def lyapunov_spectrum(
     system: HybridSystem,
     x0: ArrayLike,
     *,
-    mode: str | None = None,
-    parameters: Mapping[str, float] | None = None,
     k: int | None = None,
-    intervals: int = 1000,
-    interval: float | None = None,
-    transient: int = 200,
-    t0: float = 0.0,
-    solver: Solver | None = None,
     history: bool = True,
     progress: bool = False,
+    **asked: Unpack[Averaging],
 ) -> LyapunovSpectrum:
     """Lyapunov exponents by repeated orthonormalisation of tangent vectors.
 
@@ -215,20 +211,11 @@ def lyapunov_spectrum(
 
     Parameters
     ----------
-    system, x0, mode, parameters, solver
+    system, x0
         As for :func:`hybrid.simulate`.
     k
         Number of exponents, 1 to n; all by default, since only all of them have a sum rule. If every mode has
         an `hybrid.After`, the time since the entry is one more direction.
-    intervals, interval
-        Number of intervals to average over, and their length; by default the forcing period, or for an
-        autonomous system the time scale of its field at the start: the reciprocal of the spectral radius of
-        ``abs(D_x f)`` there.
-    transient
-        Number of intervals to run first, with tangent vectors, and discard: 200 by default, since exponents
-        belong to the attractor.
-    t0
-        Time at the start.
     history
         Whether to keep the growth rates of each interval. If False, memory does not grow with ``intervals``.
     progress
@@ -257,13 +244,12 @@ def lyapunov_spectrum(
     True
     """
     k = number_of_exponents(system, k)
-    vectors = first_vectors(system, k, solver)
-    intervals = arguments.count("intervals", intervals, 1)
-    transient = arguments.count("transient", transient, 0)
+    vectors = first_vectors(system, k, asked["solver"])
+    transient, intervals = numbers_of(asked)
     history, progress = arguments.flag("history", history), arguments.flag("progress", progress)
-    trajectory = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=vectors)
+    trajectory = begun(system, x0, asked, vectors)
     orthonormal_at_start(trajectory)
-    length = interval_length(trajectory, interval, transient + intervals)
+    length = interval_length(trajectory, asked["interval"], transient + intervals)
     load_kernels("lyapunov.kernels")
     estimates = Estimates([Flight(trajectory, length)], k, len(trajectory.system.transitions))
     with trajectory.stop, progress_bar(transient + intervals, "Lyapunov spectrum", progress) as bar:
