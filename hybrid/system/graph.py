@@ -450,6 +450,8 @@ def laws_of(system: HybridSystem, given: Laws | None = None) -> Laws:
     ArgumentError, ModelError
         If a law does not fit the system, or names an output that the system does not have.
     """
+    if given is not None:
+        arguments.instance("laws", given, Laws, "Write Laws(conserved=...), or leave it out.")
     laws = system.laws if given is None else system.laws.joined(given)
     names = _written(system, "modes"), _written(system, "transitions")
     return placed(laws, system.variables, system.outputs, *names)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable
 from typing import Any
 
 import attrs
@@ -19,10 +19,10 @@ from hybrid import arguments
 from hybrid.compiler.compiled import compile_system
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.solvers import Solver
-from hybrid.system.graph import HybridSystem, as_system
+from hybrid.system.graph import HybridSystem, as_system, laws_of
 from hybrid.system.growth import finished, stage_of
 from hybrid.system.labels import named
-from hybrid.system.laws import Elastic, Laws
+from hybrid.system.laws import Laws
 from hybrid.testing.case import TIGHT, Case
 from hybrid.testing.contacts import (
     COEFFICIENTS,
@@ -86,7 +86,7 @@ from hybrid.testing.saltation import (
     check_saltation,
     check_sum_rule,
 )
-from hybrid.testing.strategies import Ranges, all_laws, cases
+from hybrid.testing.strategies import Ranges, cases
 from hybrid.testing.ticks import check_ticks
 from hybrid.testing.units import UNITS, check_units
 from hybrid.testing.waits import TICKS
@@ -111,15 +111,7 @@ def check_system(
     t_span: tuple[float, float] | None = None,
     mode: str | None = None,
     passable: Iterable[str] = (),
-    invariant: Mapping[str, Any] | None = None,
-    equal: Mapping[str, Any] | None = None,
-    conserved: Mapping[str, Any] | None = None,
-    dissipated: Mapping[str, Any] | None = None,
-    balance: Mapping[str, Any] | None = None,
-    continuous: Iterable[str] | None = None,
-    across: Mapping[str, Any] | None = None,
-    elastic: Elastic | None = None,
-    alike: Iterable[str] | None = None,
+    laws: Laws | None = None,
     examples: int = 50,
     solver: Solver = TIGHT,
     engine: Engine = LIBRARY,
@@ -143,9 +135,9 @@ def check_system(
         Mode that runs start in; by default any mode whose guards allow the state.
     passable
         Names of transitions whose guard the state may cross and stay in the same mode.
-    invariant, equal, conserved, dissipated, balance, continuous, across, elastic, alike
-        What the author knows, as for :class:`hybrid.Laws`; beside the laws that the system carries. Starts
-        are drawn where no ``invariant`` is negative and every ``equal`` is zero.
+    laws
+        What the author knows, beside the laws that the system carries. Starts are drawn where no
+        ``invariant`` is negative and every ``equal`` is zero.
     examples
         Number of runs to draw.
     solver
@@ -179,21 +171,10 @@ def check_system(
     as_system("system", system)
     examples = arguments.count("examples", examples, 1)
     progress = None if progress is None else arguments.flag("progress", progress)
-    given = {
-        "invariant": invariant,
-        "equal": equal,
-        "conserved": conserved,
-        "dissipated": dissipated,
-        "balance": balance,
-        "continuous": continuous,
-        "across": across,
-        "elastic": elastic,
-        "alike": alike,
-    }
     if system.aging and system.age is None:
         # Only with the time since its mode was entered does a state tell how a run goes on.
         states, system = _with_age(states, system), aged(system)
-    laws = all_laws(system, given)
+    known = laws_of(system, laws)
     while True:
         drawn = cases(
             system,
@@ -204,7 +185,7 @@ def check_system(
             passable=passable,
             solver=solver,
             engine=engine,
-            **given,
+            laws=laws,
         )
         coverage = Coverage.of(system)
         with progress_bar(examples, "Runs drawn", progress, "run") as bar:
@@ -214,9 +195,9 @@ def check_system(
             break
         system = stage_of(system)
     system = finished(system)
-    flip = None if laws.elastic is None else turned("elastic", system, laws.elastic)
-    tally = _Tally(coverage, _properties(system, laws, flip), law_checks(laws))
-    tally.once(READS, lambda: check_reads(attrs.evolve(system, laws=laws)))
+    flip = None if known.elastic is None else turned("elastic", system, known.elastic)
+    tally = _Tally(coverage, _properties(system, known, flip), law_checks(known))
+    tally.once(READS, lambda: check_reads(attrs.evolve(system, laws=known)))
     if system.units:
         tally.once(DIMENSIONS, lambda: check_dimensions(system))
     if contacts_of(system) is not None and states is not None:
@@ -408,7 +389,7 @@ class _Tally:
             )
         found = [PropertyReport(name, self.held[name], self.discarded[name]) for name in self.held]
         if without_elastic:
-            found.append(PropertyReport(ELASTIC, 0, Counter({"elastic= is not given": 1})))
+            found.append(PropertyReport(ELASTIC, 0, Counter({"Laws(elastic=...) is not given": 1})))
         told = compile_system(system).emitted.discontinuities
         jumps = {mode: text for mode, text in zip(system.mode_names, told, strict=True) if text}
         return SystemReport(
