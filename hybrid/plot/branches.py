@@ -16,6 +16,7 @@ from hybrid.orbits.continuation.continue_bifurcation import BifurcationCurve
 from hybrid.orbits.diagrams.diagram import Diagram
 from hybrid.orbits.equilibria.branch import EquilibriumBranch
 from hybrid.orbits.equilibria.curves import EquilibriumCurve
+from hybrid.orbits.kinds import KINDS
 from hybrid.orbits.labelled import table_at
 from hybrid.plot.axes import (
     axes_for,
@@ -35,22 +36,7 @@ if TYPE_CHECKING:
 
 AnyBranch = Branch | EquilibriumBranch
 
-# Markers by kind of bifurcation, and those of zeros of functions that callers name.
-MARKERS = {
-    "fold": "o",
-    "flip": "s",
-    "torus": "D",
-    "branch point": "P",
-    "grazing": "v",
-    "corner": "<",
-    "border": ">",
-    "crossing-sliding": "^",
-    "grazing-sliding": "p",
-    "switching-sliding": "h",
-    "adding-sliding": "d",
-    "Hopf": "*",
-    "boundary": "8",
-}
+# Markers of zeros of functions that callers name.
 OTHERS = ("X", "H", "1", "2", "3", "4")
 LINES = {"stable": "-", "unstable": "--"}
 # Line width in points, the smallest area of a dot that is seen beside such a line, and the colour of what
@@ -366,7 +352,7 @@ def _mark(ax: Axes, found: list[tuple[str, float, float]]) -> None:
     """Signs for what has a kind and a place, named once for a legend."""
     for kind in dict.fromkeys(each[0] for each in found):
         at = np.array([each[1:] for each in found if each[0] == kind])
-        marker = MARKERS.get(kind) or _other_marker(ax, kind)
+        marker = KINDS[kind].marker if kind in KINDS else _other_marker(ax, kind)
         label = None if kind in _texts(ax) else kind
         ax.plot(
             *at.T,

@@ -17,7 +17,6 @@ from hybrid.measures.asked import Unmeasured
 from hybrid.orbits.continuation.branch import Bifurcation
 from hybrid.orbits.continuation.clearances import curve_clearance_of
 from hybrid.orbits.continuation.curve import BESIDE, SMOOTH, Curve, Special, Spot, along_curve
-from hybrid.orbits.continuation.event import KINDS
 from hybrid.orbits.continuation.monitors import JUMPED
 from hybrid.orbits.continuation.place import Place, place_of, place_on
 from hybrid.orbits.continuation.result import Points, orbit_of, whole_orbit_of
@@ -25,6 +24,7 @@ from hybrid.orbits.continuation.route import Loop
 from hybrid.orbits.continuation.watch import OfArc, Watch, checked_outputs, units_of
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation
 from hybrid.orbits.equilibria.curves import EquilibriumCurve, curve_of
+from hybrid.orbits.kinds import KINDS, OF_ORBITS, plural
 from hybrid.orbits.orbit import PeriodicOrbit, unaged
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names, attributes
@@ -35,8 +35,6 @@ from hybrid.system.graph import HybridSystem
 
 if TYPE_CHECKING:
     import xarray
-
-PLURALS = {"torus": "tori"}
 
 ENDS = {
     "range": "the end of a range",
@@ -150,7 +148,7 @@ class BifurcationCurve:
     def __repr__(self) -> str:
         spans = ", ".join(f"{name} = {self[name].min():.6g} to {self[name].max():.6g}" for name in self.names)
         special = ", ".join(each.kind for each in self.points) or "nothing special"
-        kinds, count = PLURALS.get(self.kind, f"{self.kind}s"), counted(len(self), "point")
+        kinds, count = plural(self.kind), counted(len(self), "point")
         return f"<Curve of {kinds}, {spans}, {count}, {special}, {self.status.brief}>"
 
     def orbit(self, i: int) -> PeriodicOrbit:
@@ -181,7 +179,7 @@ class BifurcationCurve:
             unit = {"units": self.output_units[name]} if name in self.output_units else {}
             variables[name] = ("point", found, unit)
         coords = {name: ("point", self[name], names.of(name)) for name in self.names}
-        made_by = attributes(f"curve of {PLURALS.get(self.kind, f'{self.kind}s')}", self.status, self.system)
+        made_by = attributes(f"curve of {plural(self.kind)}", self.status, self.system)
         return xarray.Dataset(variables, {**coords, **names.coords()}, made_by)
 
 
@@ -304,17 +302,15 @@ def _ranges(parameters: Mapping[str, float], over: object) -> tuple[tuple[str, s
 
 def _start(bifurcation: Bifurcation, names: tuple[str, str], sizes: np.ndarray, solver: Solver) -> Place:
     """The orbit at the bifurcation on the surface over both parameters."""
-    if bifurcation.kind == "branch point":
-        raise ArgumentError(
-            "bifurcation is a branch point, which goes away when another parameter changes; allowed are the "
-            "other kinds."
-        )
+    known_kind = KINDS.get(bifurcation.kind)
+    if known_kind is not None and known_kind.lost:
+        raise ArgumentError(f"bifurcation is {known_kind.lost}; allowed are the other kinds.")
     if bifurcation.kind == "Hopf":
         raise ArgumentError(
             "bifurcation is the Hopf point at which a branch of cycles ends, where no orbit is left; follow "
             "that of the equilibrium, from continue_equilibrium."
         )
-    if bifurcation.kind not in KINDS and bifurcation._zero_of.function is None:
+    if bifurcation.kind not in OF_ORBITS and bifurcation._zero_of.function is None:
         raise ArgumentError(
             f"bifurcation is a zero of events[{bifurcation.kind!r}] of a branch that was opened again or "
             "pickled, which keeps no functions: take it from one that continue_orbit makes."

@@ -15,7 +15,7 @@ from hybrid.errors import ArgumentError
 from hybrid.measures.asked import Unmeasured
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
 from hybrid.orbits.continuation.crossing import crossing, flip_coefficient, fold_coefficient, is_supercritical
-from hybrid.orbits.continuation.event import KINDS, Event, OfThisProcess
+from hybrid.orbits.continuation.event import Event, OfThisProcess
 from hybrid.orbits.continuation.hopf import first_lyapunov
 from hybrid.orbits.continuation.monitors import Monitors
 from hybrid.orbits.continuation.passing import Pass
@@ -30,6 +30,7 @@ from hybrid.orbits.continuation.watch import (
     checked_stop,
     units_of,
 )
+from hybrid.orbits.kinds import OF_ORBITS
 from hybrid.orbits.orbit import PeriodicOrbit, unaged
 from hybrid.orbits.sensitivity import is_isolated
 from hybrid.simulation.interrupt import interrupted_status
@@ -439,5 +440,5 @@ def _told(why: str) -> str:
     """Why a walk ends, in words."""
     if why.startswith(STOPPED):
         kind = why.removeprefix(STOPPED)
-        return f"{_a(kind) if kind in KINDS else f'a zero of events[{kind!r}]'} (named in stop=)"
+        return f"{_a(kind) if kind in OF_ORBITS else f'a zero of events[{kind!r}]'} (named in stop=)"
     return ENDS.get(why, _a(why))

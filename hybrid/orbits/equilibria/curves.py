@@ -27,6 +27,7 @@ from hybrid.orbits.equilibria.defining import (
 from hybrid.orbits.equilibria.equations import Equations, Reduced, reduced
 from hybrid.orbits.equilibria.equilibrium import Equilibrium, described, eigenvalues_of
 from hybrid.orbits.equilibria.normal_forms import eigenvectors, fold_forms, lyapunov_at
+from hybrid.orbits.kinds import KINDS, plural
 from hybrid.orbits.zeros import SHARES, at_zero
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names, attributes
@@ -150,8 +151,8 @@ class EquilibriumCurve:
     def __repr__(self) -> str:
         spans = ", ".join(f"{name} = {self[name].min():.6g} to {self[name].max():.6g}" for name in self.names)
         special = ", ".join(each.kind for each in self.points) or "nothing special"
-        what = {"Hopf": "Hopf points", "fold": "folds"}.get(self.kind, "boundaries")
-        return f"<Curve of {what}, {spans}, {counted(len(self), 'point')}, {special}, {self.status.brief}>"
+        kinds, count = plural(self.kind), counted(len(self), "point")
+        return f"<Curve of {kinds}, {spans}, {count}, {special}, {self.status.brief}>"
 
     def equilibrium(self, i: int) -> Equilibrium:
         """The equilibrium of a point of the curve.
@@ -189,10 +190,9 @@ def curve_of(
 ) -> EquilibriumCurve:
     """The curve of a bifurcation both ways from where it was found; errors are those of the public call."""
     point = bifurcation.equilibrium
-    if bifurcation.kind == "branch point":
+    if KINDS[bifurcation.kind].lost:
         raise ArgumentError(
-            "bifurcation is a branch point, which goes away when another parameter changes; allowed are a "
-            "fold, a Hopf point and a boundary."
+            f"bifurcation is {KINDS[bifurcation.kind].lost}; allowed are a fold, a Hopf point and a boundary."
         )
     vector = point.system.parameter_values(point.parameters)
     equations = Equations(point.system, point.mode, names, point.x, vector)

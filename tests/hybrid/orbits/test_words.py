@@ -7,9 +7,8 @@ import pytest
 
 import hybrid
 from hybrid.orbits.continuation import continue_orbit, curve
-from hybrid.orbits.continuation.event import KINDS
-from hybrid.orbits.equilibria import branch as of_equilibria
 from hybrid.orbits.equilibria import curves
+from hybrid.orbits.kinds import OF_EQUILIBRIA, OF_ORBITS
 
 DOCS = Path(__file__).parents[3] / "docs"
 OF_TWO_PARAMETERS = {"cusp", "fold-flip", *curve.RESONANCES, *curve.STRONG}
@@ -38,8 +37,8 @@ def quoted(thing):
 @pytest.mark.parametrize(
     ("kinds", "thing", "page", "title"),
     [
-        (KINDS, hybrid.Bifurcation, "branches.md", "kind"),
-        (of_equilibria.KINDS, hybrid.EquilibriumBifurcation, "equilibria.md", "kind"),
+        (OF_ORBITS, hybrid.Bifurcation, "branches.md", "kind"),
+        (OF_EQUILIBRIA, hybrid.EquilibriumBifurcation, "equilibria.md", "kind"),
         (OF_TWO_PARAMETERS, hybrid.CodimensionTwo, "branches.md", "kind of point"),
         (curves.MESSAGES, hybrid.SpecialEquilibrium, "equilibria.md", "kind of point"),
     ],
