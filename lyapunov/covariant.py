@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import HybridSystem, Status, arguments
-from hybrid.accuracy.averages import TaperedMean, standard_error, taper_inflation
 from hybrid.display.progress import progress_bar
 from hybrid.display.tables import counted
+from hybrid.measures.averages import TaperedMean, standard_error, taper_inflation
 from hybrid.orbits.triangles import Interval, Triangles
 from hybrid.shared import shares
 from hybrid.simulation.ending import status_of

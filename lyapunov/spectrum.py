@@ -13,17 +13,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridSystem, Status, arguments
-from hybrid.accuracy.averages import (
-    TaperedMean,
-    running_tapered_mean,
-    standard_error_from_batches,
-    taper_inflation,
-)
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.display.tables import counted, html_table
 from hybrid.kernels.types import codes
 from hybrid.kernels.types.entries import COUNTERS
+from hybrid.measures.averages import (
+    TaperedMean,
+    running_tapered_mean,
+    standard_error_from_batches,
+    taper_inflation,
+)
 from hybrid.shared import shares
 from hybrid.simulation.ending import has_tangents, status_of
 from hybrid.simulation.interrupt import Bursts
@@ -60,7 +60,7 @@ class LyapunovSpectrum:
     Attributes
     ----------
     exponents
-        ``(k,)``. Tapered means of the growth rates (see :class:`hybrid.accuracy.averages.TaperedMean`). On
+        ``(k,)``. Tapered means of the growth rates (see :class:`hybrid.measures.averages.TaperedMean`). On
         periodic and quasi-periodic motion their error falls like ``M^-3``; the error of the plain mean falls
         like ``1 / M``. Minus infinity for a direction that a saltation matrix annihilates.
     standard_error

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridSystem, Status, StatusCode, arguments
-from hybrid.accuracy.averages import running_tapered_mean
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.kernels.types import codes
+from hybrid.measures.averages import running_tapered_mean
 from hybrid.shared import shares
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
