@@ -6,7 +6,7 @@ own tests with ``@given(cases(system))``.
 
 import sys
 
-from hybrid.testing.case import Case, Run
+from hybrid.testing.case import Case
 from hybrid.testing.check import check_system
 from hybrid.testing.contacts import (
     check_coefficients,
@@ -42,6 +42,7 @@ from hybrid.testing.laws import check_laws
 from hybrid.testing.outputs import check_outputs
 from hybrid.testing.reads import check_reads
 from hybrid.testing.report import PropertyReport, SystemReport
+from hybrid.testing.run import Run
 from hybrid.testing.saltation import (
     check_continuity,
     check_extension,

@@ -9,8 +9,9 @@ import numpy as np
 
 from hybrid.simulation.jumps import Jump
 from hybrid.status import StatusCode
-from hybrid.testing.case import Case, as_case, guard_beyond, jump_told
+from hybrid.testing.case import Case, as_case, guard_beyond
 from hybrid.testing.errors import discard
+from hybrid.testing.words import jump_told
 
 ENDS = "A run reaches its end, or a transition or a limit ends it"
 SIDES_AFTER = "A jump leaves the state on the near side of every guard, or another fires at once"

@@ -13,11 +13,13 @@ from hybrid.compiler.compiled import compile_system
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.jumps import Jump
 from hybrid.system.graph import HybridSystem
-from hybrid.testing.case import Case, Run, as_case, matrix_told, mode_after
+from hybrid.testing.case import Case, as_case
 from hybrid.testing.contacts import discard_what_rounding_decides
 from hybrid.testing.errors import discard
 from hybrid.testing.events import BEYOND
+from hybrid.testing.run import Run, mode_after
 from hybrid.testing.variants import AGAIN, altered, new_name, renamed, reordered
+from hybrid.testing.words import matrix_told
 from hybrid.transform.contacts.growth import SETTLING, contacts_of
 
 CUT = "Cutting a flow by an identity transition changes nothing"

@@ -9,9 +9,11 @@ from hybrid.errors import ArgumentError
 from hybrid.simulation.holding import tangent_projection
 from hybrid.simulation.jumps import Jump
 from hybrid.system.functions import field_function, guard_function, reset_function
-from hybrid.testing.case import Case, as_case, jump_told, matrix_told, mode_after
+from hybrid.testing.case import Case, as_case
 from hybrid.testing.errors import discard
+from hybrid.testing.run import mode_after
 from hybrid.testing.variants import altered
+from hybrid.testing.words import jump_told, matrix_told
 
 SALTATION = "The saltation matrix is the derivative of the flow across the event"
 EXTENSION = "The saltation matrix does not depend on how the reset goes on off the guard"
