@@ -25,7 +25,7 @@ from hybrid.sweep.sheet import Labels
 from hybrid.transform.aged import aged, without_age
 from lyapunov.asked import Averaging
 from lyapunov.directions import first_vectors, number_of_exponents, orthonormal_at_start
-from lyapunov.spectrum import Estimates, Flight, Means, interval_length
+from lyapunov.estimates import Estimates, Flight, Means, interval_length
 from lyapunov.together import alike, means_together, result_of
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from hybrid.system.growth import growing
 from hybrid.transform.aged import aged
 from lyapunov.asked import Averaging, begun, numbers_of
 from lyapunov.directions import generic_directions
-from lyapunov.spectrum import interval_length
+from lyapunov.estimates import interval_length
 
 if TYPE_CHECKING:
     import xarray

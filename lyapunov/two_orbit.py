@@ -24,8 +24,8 @@ from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
 from hybrid.transform.aged import aged, with_age
 from lyapunov.asked import Averaging, begun, numbers_of
+from lyapunov.estimates import interval_length
 from lyapunov.interval import INTERVALS_AT_ONCE, end_at
-from lyapunov.spectrum import interval_length
 
 # The renormalised companion has no digits left this many roundings of the state from the orbit, or so near
 # the least of all numbers.

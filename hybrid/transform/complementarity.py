@@ -9,12 +9,13 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.errors import ModelError
+from hybrid.system.declared import as_parameters, as_state
 from hybrid.system.elements import Function, Mode
 from hybrid.system.graph import HybridSystem
 from hybrid.system.laws import Laws
 from hybrid.system.outputs import as_outputs
 from hybrid.system.periodicity import Period
-from hybrid.system.variables import Variables, as_parameters, as_state
+from hybrid.system.variables import Variables
 from hybrid.system.watched import Watched
 from hybrid.transform.pairs.pair import Pair
 

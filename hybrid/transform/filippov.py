@@ -6,10 +6,11 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from hybrid.errors import ModelError, shown
+from hybrid.system.declared import as_parameters, as_state
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
 from hybrid.system.laws import Laws
-from hybrid.system.variables import Variables, as_parameters, as_state
+from hybrid.system.variables import Variables
 from hybrid.system.watched import Watched
 from hybrid.transform.surface import SwitchingSurface
 

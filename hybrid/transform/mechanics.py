@@ -8,12 +8,13 @@ from typing import Any
 from hybrid import arguments
 from hybrid.errors import HybridError, ModelError
 from hybrid.system.checks import check_cyclic
+from hybrid.system.declared import as_parameters, as_state
 from hybrid.system.elements import Function, Mode
 from hybrid.system.functions import ModelFunction
 from hybrid.system.graph import HybridSystem
 from hybrid.system.laws import Laws
 from hybrid.system.outputs import as_outputs
-from hybrid.system.variables import Variables, as_parameters, as_state
+from hybrid.system.variables import Variables
 from hybrid.system.watched import Watched
 from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.contacts.statuses import FREE, statuses_of

@@ -19,12 +19,11 @@ from hybrid.orbits.continuation.place import (
     Place,
     distance,
     interpolated_zero,
-    is_real,
     moment,
     place_of,
-    slides,
     start_of,
 )
+from hybrid.orbits.continuation.real import is_real, slides
 from hybrid.orbits.continuation.route import Route, from_limits, rotations
 from hybrid.orbits.continuation.seams import is_same_motion
 from hybrid.simulation.holding import drawn_back

@@ -31,8 +31,8 @@ from hybrid.testing import (
     small_systems,
     states,
 )
+from hybrid.testing.elastic import ELASTIC
 from hybrid.testing.events import JUMPS, SIDES
-from hybrid.testing.invariance import ELASTIC
 from hybrid.testing.saltation import CONTINUITY, SUM_RULE
 from tests.cases import systems
 

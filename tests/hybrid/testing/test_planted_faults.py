@@ -37,7 +37,7 @@ from hybrid.testing import (
     check_system,
     check_units,
 )
-from hybrid.testing.invariance import ELASTIC
+from hybrid.testing.elastic import ELASTIC
 from tests.cases import systems
 from tests.hybrid.systems import shaken_table
 
