@@ -17,7 +17,6 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 from hybrid import Guard, Laws, Mode, Reset, Transition, arguments
 from models.contact_energy import (
     Bodies,
-    hertz_energy,
     hertz_force,
     hunt_crossley_force,
     hunt_crossley_power,
@@ -28,6 +27,14 @@ from models.contact_energy import (
     restitution_error,
     soft_laws,
     spring_energy,
+)
+from models.contact_motion import (
+    collided,
+    force_between,
+    free,
+    in_and_out,
+    pushed,
+    soft_outputs,
 )
 
 # Restitution of a Kelvin-Voigt contact with critical damping; a smaller one needs damping above critical.
@@ -97,11 +104,11 @@ class Rigid:
 
     def modes(self, bodies: Bodies) -> list[Mode]:
         """``free``."""
-        return [_free(bodies)]
+        return [free(bodies)]
 
     def transitions(self, bodies: Bodies) -> list[Transition]:
         """``impact``."""
-        collision = Reset(partial(_collided, bodies))
+        collision = Reset(partial(collided, bodies))
         return [Transition("free", "free", Guard(bodies.penetration, +1), collision, name="impact")]
 
     def outputs(self, bodies: Bodies) -> dict[str, Any]:
@@ -140,15 +147,15 @@ class Hertz:
 
     def modes(self, bodies: Bodies) -> list[Mode]:
         """``free`` and ``contact``."""
-        return [_free(bodies), _pushed(bodies, hertz_force)]
+        return [free(bodies), pushed(bodies, hertz_force)]
 
     def transitions(self, bodies: Bodies) -> list[Transition]:
         """``impact`` and ``release``."""
-        return _in_and_out(bodies)
+        return in_and_out(bodies)
 
     def outputs(self, bodies: Bodies) -> dict[str, Any]:
         """Force and energy."""
-        return _soft_outputs(bodies, hertz_force)
+        return soft_outputs(bodies, hertz_force)
 
     def laws(self, bodies: Bodies) -> Laws:
         """Energy with that of the contact; no force at the impact."""
@@ -247,17 +254,17 @@ class HuntCrossley:
     def modes(self, bodies: Bodies) -> list[Mode]:
         """``free`` and ``contact``."""
         return [
-            _free(bodies),
-            _pushed(bodies, hunt_crossley_force),
+            free(bodies),
+            pushed(bodies, hunt_crossley_force),
         ]
 
     def transitions(self, bodies: Bodies) -> list[Transition]:
         """``impact`` and ``release``."""
-        return _in_and_out(bodies)
+        return in_and_out(bodies)
 
     def outputs(self, bodies: Bodies) -> dict[str, Any]:
         """Force and energy."""
-        return _soft_outputs(bodies, hunt_crossley_force)
+        return soft_outputs(bodies, hunt_crossley_force)
 
     def laws(self, bodies: Bodies) -> Laws:
         """Energy with that of the contact, and its loss; no force at the impact."""
@@ -332,13 +339,13 @@ class KelvinVoigt:
 
     def modes(self, bodies: Bodies) -> list[Mode]:
         """``free``, ``contact`` and ``recovery``."""
-        free = _free(bodies)
-        contact = _pushed(bodies, kelvin_voigt_force)
-        return [free, contact, Mode("recovery", free.field)]
+        parted = free(bodies)
+        contact = pushed(bodies, kelvin_voigt_force)
+        return [parted, contact, Mode("recovery", parted.field)]
 
     def transitions(self, bodies: Bodies) -> list[Transition]:
         """``impact``, ``release``, ``parting`` and ``return``."""
-        force = partial(_force_between, bodies, kelvin_voigt_force)
+        force = partial(force_between, bodies, kelvin_voigt_force)
         return [
             Transition("free", "contact", Guard(bodies.penetration, +1), name="impact"),
             Transition("contact", "recovery", Guard(force, -1), name="release"),
@@ -349,11 +356,11 @@ class KelvinVoigt:
     def outputs(self, bodies: Bodies) -> dict[str, Any]:
         """Force and energy; while the surfaces recover there is no force, and their energy is lost."""
         energy = {"free": bodies.energy, "contact": partial(spring_energy, bodies), "recovery": bodies.energy}
-        return {"force": {"contact": partial(_force_between, bodies, kelvin_voigt_force)}, "energy": energy}
+        return {"force": {"contact": partial(force_between, bodies, kelvin_voigt_force)}, "energy": energy}
 
     def laws(self, bodies: Bodies) -> Laws:
         """Energy with that of the spring, and its loss; no force but at the impact."""
-        force = partial(_force_between, bodies, kelvin_voigt_force)
+        force = partial(force_between, bodies, kelvin_voigt_force)
         contact = Laws(
             invariant={
                 "contact": {"penetration": bodies.penetration, "force": force},
@@ -436,44 +443,11 @@ def after_collision(m1: float, m2: float, v1: Any, v2: Any, e: Any) -> tuple[Any
     return v1 - impulse / m1, v2 + impulse / m2
 
 
-def _free(bodies: Bodies) -> Mode:
-    return Mode("free", partial(_apart, bodies))
-
-
-def _pushed(bodies: Bodies, force: Callable[..., Any]) -> Mode:
-    """The mode ``contact`` under a force of ``(penetration, rate, p)``."""
-    return Mode("contact", partial(_pushed_apart, bodies, force))
-
-
-def _soft_outputs(bodies: Bodies, force: Callable[..., Any]) -> dict[str, Any]:
-    """Force and energy of a contact whose force begins and ends with the penetration."""
-    return {
-        "force": {"contact": partial(_force_between, bodies, force)},
-        "energy": {"free": bodies.energy, "contact": partial(hertz_energy, bodies)},
-    }
-
-
-def _apart(bodies, t, x, p):
-    return bodies.field(t, x, p, 0.0)
-
-
-def _pushed_apart(bodies, force, t, x, p):
-    return bodies.field(t, x, p, _force_between(bodies, force, t, x, p))
-
-
-def _force_between(bodies, force, t, x, p):
-    return force(bodies.penetration(t, x, p), bodies.rate(t, x, p), p)
-
-
-def _collided(bodies, t, x, p):
-    return bodies.collided(t, x, p, p.e)
-
-
-def _in_and_out(bodies: Bodies) -> list[Transition]:
-    return [
-        Transition("free", "contact", Guard(bodies.penetration, +1), name="impact"),
-        Transition("contact", "free", Guard(bodies.penetration, -1), name="release"),
-    ]
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    """Zero of a function that is negative at ``low`` and positive at ``high``, by bisection to rounding."""
+    while low < (middle := (low + high) / 2) < high:
+        low, high = (middle, high) if function(middle) < 0 else (low, middle)
+    return high
 
 
 def _restitution(e: float) -> float:
@@ -481,10 +455,3 @@ def _restitution(e: float) -> float:
     if not 0 < found <= 1:
         raise arguments.refusal("e", RESTITUTION, e)
     return found
-
-
-def _root(function: Callable[[float], float], low: float, high: float) -> float:
-    """Zero of a function that is negative at ``low`` and positive at ``high``, by bisection to rounding."""
-    while low < (middle := (low + high) / 2) < high:
-        low, high = (middle, high) if function(middle) < 0 else (low, middle)
-    return high

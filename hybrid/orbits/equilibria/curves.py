@@ -12,7 +12,6 @@ from hybrid.display.progress import Progress, progress_bar
 from hybrid.errors import ArgumentError
 from hybrid.orbits.equilibria.bifurcation_curve import EquilibriumCurve, SpecialEquilibrium
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation
-from hybrid.orbits.equilibria.continue_equilibrium import pair_sums
 from hybrid.orbits.equilibria.curve import Spot, spot_at, walk, zero_between
 from hybrid.orbits.equilibria.defining import (
     BoundaryPoint,
@@ -24,6 +23,7 @@ from hybrid.orbits.equilibria.defining import (
 )
 from hybrid.orbits.equilibria.equations import Equations, Reduced, reduced
 from hybrid.orbits.equilibria.equilibrium import described, eigenvalues_of
+from hybrid.orbits.equilibria.met import pair_sums
 from hybrid.orbits.equilibria.normal_forms import eigenvectors, fold_forms, lyapunov_at
 from hybrid.orbits.kinds import KINDS
 from hybrid.orbits.zeros import SHARES, at_zero
