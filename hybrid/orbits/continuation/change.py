@@ -9,9 +9,10 @@ import attrs
 import numpy as np
 
 from hybrid.orbits.continuation.clearances import Key, changed, clearance_of
+from hybrid.orbits.continuation.equations import CLOSED
 from hybrid.orbits.continuation.grazing import kick, square_root_coefficient, what_follows
 from hybrid.orbits.continuation.onward import Onward, onward_of
-from hybrid.orbits.continuation.passing import CLOSED, Pass
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import (
     BESIDE,
     Place,

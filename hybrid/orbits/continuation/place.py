@@ -10,9 +10,10 @@ import attrs
 import numpy as np
 
 from hybrid.errors import ArgumentError
+from hybrid.orbits.continuation.equations import CLOSED
 from hybrid.orbits.continuation.family import ROUNDING, Family
 from hybrid.orbits.continuation.parts import divided, growth, holding
-from hybrid.orbits.continuation.passing import CLOSED, Pass
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.route import LARGEST_GROWTH, Loop, route_of
 from hybrid.orbits.held import conserved_at
 from hybrid.orbits.zeros import SHARES, at_zero, interpolated, zero_on_the_way

@@ -8,7 +8,8 @@ import attrs
 import numpy as np
 
 from hybrid.errors import ArgumentError
-from hybrid.orbits.continuation.passing import CLOSED, Pass
+from hybrid.orbits.continuation.equations import CLOSED
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import moment
 from hybrid.orbits.continuation.route import from_limits, with_effect
 from hybrid.simulation.simulate import simulate
