@@ -1,16 +1,18 @@
-"""Two bodies that are apart or pushed into each other: fields, guards and outputs that contact laws share."""
+"""What contact laws between two bodies share: their interface, fields, guards, outputs, restitution."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
-from hybrid import Guard, Mode, Transition
+from hybrid import Guard, Laws, Mode, Transition, arguments
 from models.contact_energy import (
     Bodies,
     hertz_energy,
 )
+
+RESTITUTION = "satisfy 0 < e <= 1 in a compliant contact (in a rigid one e may be 0)"
 
 
 def free(bodies: Bodies) -> Mode:
@@ -57,3 +59,52 @@ def in_and_out(bodies: Bodies) -> list[Transition]:
         Transition("free", "contact", Guard(bodies.penetration, +1), name="impact"),
         Transition("contact", "free", Guard(bodies.penetration, -1), name="release"),
     ]
+
+
+@runtime_checkable
+class ContactLaw(Protocol):
+    """A law of contact: its parameters, and the modes and transitions of two bodies in contact.
+
+    In the mode ``free`` the bodies are apart; contact begins with the transition ``impact``.
+    """
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Default values by name."""
+        ...
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units of the parameters by name, for a state in m and m/s."""
+        ...
+
+    def modes(self, bodies: Bodies) -> list[Mode]:
+        """The mode ``free`` and those in which the bodies touch."""
+        ...
+
+    def transitions(self, bodies: Bodies) -> list[Transition]:
+        """The transition ``impact`` and those that lead back to ``free``."""
+        ...
+
+    def outputs(self, bodies: Bodies) -> dict[str, Any]:
+        """The energy, and the force of the contact if there is one."""
+        ...
+
+    def laws(self, bodies: Bodies) -> Laws:
+        """What is known of gap, energy and impact."""
+        ...
+
+
+def restitution_of(e: float) -> float:
+    """A coefficient of restitution that a compliant contact can have."""
+    found = arguments.not_negative("e", e, RESTITUTION)
+    if not 0 < found <= 1:
+        raise arguments.refusal("e", RESTITUTION, e)
+    return found
+
+
+def root(function: Callable[[float], float], low: float, high: float) -> float:
+    """Zero of a function that is negative at ``low`` and positive at ``high``, by bisection to rounding."""
+    while low < (middle := (low + high) / 2) < high:
+        low, high = (middle, high) if function(middle) < 0 else (low, middle)
+    return high
