@@ -42,7 +42,7 @@ class Row:
     status: str = "SUCCESS"
 
 
-def run(name: str, method: Method, *problem: Any) -> Callable[[float], Any]:
+def runner(name: str, method: Method, *problem: Any) -> Callable[[float], Any]:
     """The method as a function of the tolerance."""
     if isinstance(method, Solver):
         ratio = method.atol / method.rtol

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from hybrid import arguments
 from hybrid.accuracy.answer import QUANTITIES, Answer, as_answer, errors_of, rounding_of
-from hybrid.accuracy.measured import Method, check_clock, measured, own_answer, run
+from hybrid.accuracy.measured import Method, check_clock, measured, own_answer, runner
 from hybrid.display.tables import table
 from hybrid.errors import ArgumentError
 from hybrid.simulation.arc import HybridArc
@@ -252,7 +252,7 @@ def work_precision(
     system.parameter_values(parameters)
     tangent = arguments.flag("tangent", tangent)
     runs = {
-        name: run(name, method, system, x0, t_span, mode, parameters, tangent)
+        name: runner(name, method, system, x0, t_span, mode, parameters, tangent)
         for name, method in arguments.mapping("methods", methods, "map names to methods").items()
     }
     if not runs:
