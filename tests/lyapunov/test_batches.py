@@ -4,10 +4,10 @@ import numba
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.hybrid.measures.test_averages import autoregressive
 
 from hybrid.measures.averages import MAX_BATCHES, standard_error, standard_error_from_batches
 from lyapunov.batches import EMPTY, closed_batch_means, push
+from tests.hybrid.measures.test_averages import autoregressive
 
 
 def accumulate(series, batches, add=push):
