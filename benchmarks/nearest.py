@@ -231,7 +231,7 @@ NEAREST = {
     "hybrid/orbits/factors.py": ("orbits/test_periodic_orbit.py", "../lyapunov/test_floquet.py"),
     "hybrid/orbits/newton.py": ("orbits/test_periodic_orbit.py",),
     "hybrid/orbits/held.py": ("orbits/test_conserved.py",),
-    "hybrid/orbits/verdict.py": ("orbits/test_periodic_orbit.py", "orbits/test_conserved.py"),
+    "hybrid/orbits/judgement.py": ("orbits/test_periodic_orbit.py", "orbits/test_conserved.py"),
     "hybrid/plot/__init__.py": ("plot/test_drawn.py",),
     "hybrid/plot/arcs.py": ("plot/test_plot.py",),
     "hybrid/plot/graph.py": ("plot/test_plot.py",),

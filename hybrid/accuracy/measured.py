@@ -29,7 +29,7 @@ Method = Solver | Callable[[float], Any]
 
 
 @attrs.frozen
-class Row:
+class TableRow:
     """A row of the table: the errors of one method at one tolerance, by quantity, and what it took."""
 
     method: str
@@ -102,7 +102,7 @@ def measured(
     repeats: int,
     longest: float,
     clock: Callable[[], float],
-) -> Row:
+) -> TableRow:
     """Run a method several times and compare its answer with the truth.
 
     ``shape`` is the dimension of the state and the length of the run. A run is repeated unless it takes
@@ -132,13 +132,13 @@ def measured(
     except ArgumentError:
         raise
     except KeyboardInterrupt:
-        return Row(name, tolerance, seconds=clock() - begin, status=StatusCode.INTERRUPTED.name)
+        return TableRow(name, tolerance, seconds=clock() - begin, status=StatusCode.INTERRUPTED.name)
     except Exception as error:  # another package's failure is a result of the comparison
         said = f"{type(error).__name__}: {error}".strip().splitlines()[0]
-        return Row(name, tolerance, seconds=clock() - begin, status=said)
+        return TableRow(name, tolerance, seconds=clock() - begin, status=said)
     answer = as_answer(f"Method {name!r}: what it returns", result, *shape)
     seconds = float(np.median(times))
-    return Row(
+    return TableRow(
         method=name,
         tolerance=tolerance,
         errors=errors_of(answer, truth),

@@ -13,11 +13,11 @@ from hybrid.orbits.continuation.family import Family
 from hybrid.orbits.continuation.order import order_status
 from hybrid.orbits.continuation.route import accumulating
 from hybrid.orbits.held import Held, held_by
+from hybrid.orbits.judgement import FAMILY, NEARLY_SINGULAR, POINT_ERROR, TIGHTER, Judgement
 from hybrid.orbits.lap import Fired, Lap, lap_of
 from hybrid.orbits.newton import ROUNDING_OF_GAP, Newton, Point, Shot, length
 from hybrid.orbits.orbit import PeriodicOrbit, closes, shift_over, turns_over
 from hybrid.orbits.rest import EPSILON, drift
-from hybrid.orbits.verdict import FAMILY, NEARLY_SINGULAR, POINT_ERROR, TIGHTER, Verdict
 from hybrid.orbits.waits import waits_change
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.ending import status_of
@@ -291,14 +291,14 @@ class Shooting:
         lap, jumps = self._lap(shot)
         orbit = self._orbit(lap, lap.jumps or jumps, shot)
         finer = attrs.evolve(self, mode=shot.mode, solver=self.solver.tightened(TIGHTER**2)).shoot
-        verdict = Verdict(shot, newton, iterations, tolerance, self.solver, finer)
-        status = verdict.status
+        judgement = Judgement(shot, newton, iterations, tolerance, self.solver, finer)
+        status = judgement.status
         if closes(status) and lap.orbit is not None and lap.orbit.has_meetings:
             lap = lap.in_order_of(orbit.arc())
             orbit = self._orbit(lap, lap.jumps or jumps, shot)
         if status.ok:
             held = "" if self.held is None else self.held.told
-            status = verdict.explained(status, orbit.multipliers, held)
+            status = judgement.explained(status, orbit.multipliers, held)
         if status.ok and lap.orbit is not None:
             status = order_status(lap.orbit) or status
         return attrs.evolve(orbit, iterations=iterations, status=status)

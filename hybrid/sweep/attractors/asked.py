@@ -10,7 +10,7 @@ from hybrid.system.elements import Guard
 OF_A_RUN = "As for :func:`hybrid.simulate`."
 
 
-class Settling(TypedDict, total=False):
+class AskedOfRuns(TypedDict, total=False):
     """Where runs begin, and when they are near an attractor."""
 
     mode: Annotated[str | None, Shared(None, OF_A_RUN)]
@@ -43,7 +43,7 @@ class Settling(TypedDict, total=False):
     ]
 
 
-class Search(Settling, total=False):
+class AskedOfSearch(AskedOfRuns, total=False):
     """Besides, where the points of runs are taken, and what tells attractors apart."""
 
     section: Annotated[

@@ -16,7 +16,7 @@ from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names
 from hybrid.status import Status, StatusCode
-from hybrid.sweep.attractors.asked import Search
+from hybrid.sweep.attractors.asked import AskedOfSearch
 from hybrid.sweep.attractors.attractor import Attractors, unaged
 from hybrid.sweep.attractors.featured import search_of
 from hybrid.sweep.attractors.runs import CODE, OWNER
@@ -30,7 +30,7 @@ from hybrid.transform.aged import with_age
 
 
 @growing
-@shares(Search)
+@shares(AskedOfSearch)
 def attractors(
     system: HybridSystem,
     over: Any,
@@ -39,7 +39,7 @@ def attractors(
     seed: int = 0,
     executor: int | None = None,
     progress: bool | None = None,
-    **asked: Unpack[Search],
+    **asked: Unpack[AskedOfSearch],
 ) -> Attractors:
     """Attractors that random starts lead to, by recurrences of their runs on a section, or by features.
 

@@ -18,7 +18,7 @@ from hybrid.simulation.extra import load_xarray
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names
 from hybrid.status import Status, StatusCode
-from hybrid.sweep.attractors.asked import Search
+from hybrid.sweep.attractors.asked import AskedOfSearch
 from hybrid.sweep.attractors.attractor import Attractors, unaged
 from hybrid.sweep.attractors.attractors import as_flag, status_of_search
 from hybrid.sweep.attractors.featured import search_of
@@ -48,7 +48,7 @@ VIOLATES = -1
 
 
 @growing
-@shares(Search)
+@shares(AskedOfSearch)
 def basins(
     system: HybridSystem,
     over: Any,
@@ -56,7 +56,7 @@ def basins(
     store: str | PathLike[str] | None = None,
     executor: Any = None,
     progress: bool | None = None,
-    **asked: Unpack[Search],
+    **asked: Unpack[AskedOfSearch],
 ) -> xarray.Dataset:
     """Which attractor each start of a grid leads to, with the attractors.
 

@@ -20,7 +20,7 @@ from hybrid.orbits.periodic_orbit import out_of_phase
 from hybrid.shared import shares
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.status import Status, StatusCode
-from hybrid.sweep.attractors.asked import Settling
+from hybrid.sweep.attractors.asked import AskedOfRuns
 from hybrid.sweep.attractors.attractor import Attractor, unaged
 from hybrid.sweep.attractors.attractors import as_flag
 from hybrid.sweep.attractors.closing import BACK, closed
@@ -46,7 +46,7 @@ Saddle = Equilibrium | PeriodicOrbit
 
 
 @growing
-@shares(Settling)
+@shares(AskedOfRuns)
 def edge_state(
     system: HybridSystem,
     one: ArrayLike | Mapping[str, float] | Attractor,
@@ -54,7 +54,7 @@ def edge_state(
     *,
     rounds: int = 100,
     progress: bool | None = None,
-    **asked: Unpack[Settling],
+    **asked: Unpack[AskedOfRuns],
 ) -> EdgeState:
     """The saddle on the boundary between the basins of two attractors, by edge tracking.
 

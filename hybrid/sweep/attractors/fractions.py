@@ -18,7 +18,7 @@ from hybrid.simulation.extra import load_xarray
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.status import Status, StatusCode
-from hybrid.sweep.attractors.asked import Search
+from hybrid.sweep.attractors.asked import AskedOfSearch
 from hybrid.sweep.attractors.attractor import Attractor
 from hybrid.sweep.attractors.attractors import as_flag, status_of_search
 from hybrid.sweep.attractors.featured import search_of
@@ -45,7 +45,7 @@ WANTED = 'be None, or map one parameter to its values, as {"w": np.linspace(0.8,
 
 
 @growing
-@shares(Search)
+@shares(AskedOfSearch)
 def basin_fractions(
     system: HybridSystem,
     over: Any,
@@ -56,7 +56,7 @@ def basin_fractions(
     store: str | PathLike[str] | None = None,
     executor: Any = None,
     progress: bool | None = None,
-    **asked: Unpack[Search],
+    **asked: Unpack[AskedOfSearch],
 ) -> xarray.Dataset:
     r"""Shares of random starts that lead to each attractor, with standard errors; also over a parameter.
 

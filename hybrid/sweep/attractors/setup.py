@@ -18,7 +18,7 @@ from hybrid.simulation.periods import check_time
 from hybrid.simulation.plan import check_solver
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
-from hybrid.sweep.attractors.asked import Search, Settling
+from hybrid.sweep.attractors.asked import AskedOfRuns, AskedOfSearch
 from hybrid.sweep.attractors.features import Features, checked_features
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, as_system, check_mode
@@ -115,15 +115,15 @@ def digest(array: np.ndarray) -> str:
     return blake2b(np.ascontiguousarray(array).tobytes(), digest_size=8).hexdigest()
 
 
-def setup_of(system: HybridSystem, origins: np.ndarray, given: Settling) -> Setup:
+def setup_of(system: HybridSystem, origins: np.ndarray, given: AskedOfRuns) -> Setup:
     """The setup of a search with every argument checked.
 
     The system is the aged one: where a mode is left at a time after its entry, that time is a part of the
     state. The least of the starts ``origins (N, n)`` shows the time scale, whatever their order. ``given``
-    may be a `Search`, which has a section and features besides.
+    may be a `AskedOfSearch`, which has a section and features besides.
     """
     as_system("system", system)
-    asked: Search = {"section": None, "features": None, "together": None, **given}
+    asked: AskedOfSearch = {"section": None, "features": None, "together": None, **given}
     system = aged(system)
     overrides = system.variables.overrides(asked["parameters"])
     system.parameter_values(overrides)

@@ -1,4 +1,4 @@
-"""The verdict on the last shot of a search: a periodic orbit, one of many, or none, and why."""
+"""The judgement on the last shot of a search: a periodic orbit, one of many, or none, and why."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ HOLD_IT = (
 
 
 @attrs.frozen(eq=False)
-class Verdict:
+class Judgement:
     """What the last shot of Newton's method is, after so many ``iterations`` and with so much ``tolerance``.
 
     ``finer`` shoots from a point in the mode of the shot with tolerances that are tighter by the square of
