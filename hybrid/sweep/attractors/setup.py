@@ -120,7 +120,7 @@ def setup_of(system: HybridSystem, origins: np.ndarray, given: AskedOfRuns) -> S
 
     The system is the aged one: where a mode is left at a time after its entry, that time is a part of the
     state. The least of the starts ``origins (N, n)`` shows the time scale, whatever their order. ``given``
-    may be a `AskedOfSearch`, which has a section and features besides.
+    may be an `AskedOfSearch`, which has a section and features besides.
     """
     as_system("system", system)
     asked: AskedOfSearch = {"section": None, "features": None, "together": None, **given}
