@@ -19,7 +19,7 @@ from hybrid import Taylor, simulate, simulate_many
 from hybrid.simulation.trajectory import start as begin
 from lyapunov import lyapunov_spectrum
 from lyapunov.directions import first_vectors
-from lyapunov.spectrum import Estimates, Flight
+from lyapunov.estimates import Estimates, Flight
 from lyapunov.together import means_together
 
 ROWS = 480

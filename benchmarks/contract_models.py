@@ -8,7 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
 
 
 @attrs.frozen
@@ -106,16 +106,22 @@ def pendulum_with_peg() -> Subject:
     known = {
         "states": {"th": (-0.8, 0.8), "om": (-1.0, 1.0)},
         "t_span": (0.0, 4.0),
-        "invariant": {
-            "free": {"the string is left of the peg": lambda t, x, p: p.beta - x.th},
-            "wrapped": {"the string touches the peg": lambda t, x, p: x.th - p.beta},
-        },
-        "conserved": {"free": {"energy": energy(whole)}, "wrapped": {"energy": energy(short)}},
-        "across": {
-            "catch": {"speed of the bob": lambda t, minus, plus, p: p.L * minus.om - (p.L - p.d) * plus.om},
-            "release": {"speed of the bob": lambda t, minus, plus, p: (p.L - p.d) * minus.om - p.L * plus.om},
-        },
-        "elastic": ("om",),
+        "laws": Laws(
+            invariant={
+                "free": {"the string is left of the peg": lambda t, x, p: p.beta - x.th},
+                "wrapped": {"the string touches the peg": lambda t, x, p: x.th - p.beta},
+            },
+            conserved={"free": {"energy": energy(whole)}, "wrapped": {"energy": energy(short)}},
+            across={
+                "catch": {
+                    "speed of the bob": lambda t, minus, plus, p: p.L * minus.om - (p.L - p.d) * plus.om
+                },
+                "release": {
+                    "speed of the bob": lambda t, minus, plus, p: (p.L - p.d) * minus.om - p.L * plus.om
+                },
+            },
+            elastic=("om",),
+        ),
     }
     errors = (
         Error(
@@ -186,16 +192,18 @@ def two_tanks() -> Subject:
     known = {
         "states": {"h1": (0.3, 1.1), "h2": (0.2, 1.0)},
         "t_span": (0.0, 400.0),
-        "invariant": {
-            "the upper tank does not overflow": lambda t, x, p: p.high - x.h1,
-            "the upper tank does not run dry": lambda t, x, p: x.h1 - p.low,
-        },
-        "balance": {
-            "volume": (
-                lambda t, x, p: p.S1 * x.h1 + p.S2 * x.h2,
-                lambda t, x, p: p.pump - p.a2 * np.sqrt(2 * p.g * x.h2),
-            )
-        },
+        "laws": Laws(
+            invariant={
+                "the upper tank does not overflow": lambda t, x, p: p.high - x.h1,
+                "the upper tank does not run dry": lambda t, x, p: x.h1 - p.low,
+            },
+            balance={
+                "volume": (
+                    lambda t, x, p: p.S1 * x.h1 + p.S2 * x.h2,
+                    lambda t, x, p: p.pump - p.a2 * np.sqrt(2 * p.g * x.h2),
+                )
+            },
+        ),
     }
 
     def dry(area, level, p):
@@ -279,16 +287,18 @@ def block_on_belt() -> Subject:
     known = {
         "states": {"x": (-1.0, 1.0), "v": (-2.0, 2.0)},
         "t_span": (0.0, 6.0),
-        "invariant": {
-            "stick": {"the belt holds the block": lambda t, x, p: p.mu_s * p.m * p.g - np.abs(p.k * x.x)},
-            "behind": {"slower than the belt": lambda t, x, p: p.belt - x.v},
-            "ahead": {"faster than the belt": lambda t, x, p: x.v - p.belt},
-        },
-        "equal": {"stick": {"carried by the belt": lambda t, x, p: x.v - p.belt}},
-        "dissipated": {
-            "behind": {"energy": (energy, lambda t, x, p: p.mu_k * p.m * p.g * p.belt)},
-            "ahead": {"energy": (energy, lambda t, x, p: -p.mu_k * p.m * p.g * p.belt)},
-        },
+        "laws": Laws(
+            invariant={
+                "stick": {"the belt holds the block": lambda t, x, p: p.mu_s * p.m * p.g - np.abs(p.k * x.x)},
+                "behind": {"slower than the belt": lambda t, x, p: p.belt - x.v},
+                "ahead": {"faster than the belt": lambda t, x, p: x.v - p.belt},
+            },
+            equal={"stick": {"carried by the belt": lambda t, x, p: x.v - p.belt}},
+            dissipated={
+                "behind": {"energy": (energy, lambda t, x, p: p.mu_k * p.m * p.g * p.belt)},
+                "ahead": {"energy": (energy, lambda t, x, p: -p.mu_k * p.m * p.g * p.belt)},
+            },
+        ),
     }
     errors = (
         Error(
@@ -353,13 +363,15 @@ def pendulum_between_walls() -> Subject:
     known = {
         "states": {"th": (-0.4, 0.4), "om": (-1.0, 1.0)},
         "parameters": {"r": (0.7, 1.0)},
-        "invariant": {"between the walls": lambda t, x, p: p.alpha - np.abs(x.th)},
-        "dissipated": {
-            "energy": (
-                lambda t, x, p: 0.5 * x.om**2 + np.cos(x.th),
-                lambda t, x, p: p.gamma * np.cos(p.w * t) * x.om,
-            )
-        },
+        "laws": Laws(
+            invariant={"between the walls": lambda t, x, p: p.alpha - np.abs(x.th)},
+            dissipated={
+                "energy": (
+                    lambda t, x, p: 0.5 * x.om**2 + np.cos(x.th),
+                    lambda t, x, p: p.gamma * np.cos(p.w * t) * x.om,
+                )
+            },
+        ),
     }
     errors = (
         Error(
@@ -435,10 +447,12 @@ def thermostat() -> Subject:
     known = {
         "states": {"R": (20.0, 40.0), "T": (18.0, 22.0)},
         "parameters": {"low": (18.5, 19.5), "high": (20.5, 21.5)},
-        "balance": {
-            "off": {"heat": (heat, net(lambda p: 0.0))},
-            "on": {"heat": (heat, net(lambda p: p.P))},
-        },
+        "laws": Laws(
+            balance={
+                "off": {"heat": (heat, net(lambda p: 0.0))},
+                "on": {"heat": (heat, net(lambda p: p.P))},
+            }
+        ),
     }
     errors = (
         Error(

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 from benchmarks.contract_models import Error, Subject, edge, guard, mode, reset
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
 
 
 def without(system: HybridSystem, name: str) -> HybridSystem:
@@ -58,15 +58,19 @@ def ball_on_slope() -> Subject:
     known = {
         "states": {"s": (0.0, 2.0), "n": (0.0, 1.0), "u": (-1.0, 1.0), "w": (-1.0, 1.0)},
         "t_span": (0.0, 4.0),
-        "invariant": {"flight": {"above the slope": lambda t, x, p: x.n}},
-        "equal": {
-            "slide": {
-                "on the slope": lambda t, x, p: x.n,
-                "stays on the slope": lambda t, x, p: x.w,
-            }
-        },
-        "dissipated": {"energy": energy},
-        "across": {"bounce": {"keeps its speed along the slope": lambda t, minus, plus, p: plus.u - minus.u}},
+        "laws": Laws(
+            invariant={"flight": {"above the slope": lambda t, x, p: x.n}},
+            equal={
+                "slide": {
+                    "on the slope": lambda t, x, p: x.n,
+                    "stays on the slope": lambda t, x, p: x.w,
+                }
+            },
+            dissipated={"energy": energy},
+            across={
+                "bounce": {"keeps its speed along the slope": lambda t, minus, plus, p: plus.u - minus.u}
+            },
+        ),
     }
     errors = (
         Error(
@@ -139,18 +143,20 @@ def boost_converter() -> Subject:
     known = {
         "states": {"i": (0.0, 1.0), "v": (8.0, 25.0)},
         "t_span": (0.0, 5e-4),
-        "invariant": {
-            "closed": {"the current is below its limit": lambda t, x, p: p.I_max - x.i},
-            "open": {"no reverse current": lambda t, x, p: x.i},
-            "blocked": {"reverse voltage": lambda t, x, p: x.v - p.E},
-        },
-        "equal": {"blocked": {"no current": lambda t, x, p: x.i}},
-        "balance": {
-            "energy": (
-                lambda t, x, p: 0.5 * p.L * x.i**2 + 0.5 * p.C * x.v**2,
-                lambda t, x, p: p.E * x.i - x.v**2 / p.R,
-            )
-        },
+        "laws": Laws(
+            invariant={
+                "closed": {"the current is below its limit": lambda t, x, p: p.I_max - x.i},
+                "open": {"no reverse current": lambda t, x, p: x.i},
+                "blocked": {"reverse voltage": lambda t, x, p: x.v - p.E},
+            },
+            equal={"blocked": {"no current": lambda t, x, p: x.i}},
+            balance={
+                "energy": (
+                    lambda t, x, p: 0.5 * p.L * x.i**2 + 0.5 * p.C * x.v**2,
+                    lambda t, x, p: p.E * x.i - x.v**2 / p.R,
+                )
+            },
+        ),
     }
     errors = (
         Error(
@@ -244,21 +250,23 @@ def two_carts() -> Subject:
     known = {
         "states": {"x1": (-1.0, 1.0), "x2": (-1.0, 1.0)},
         "t_span": (0.0, 8.0),
-        "invariant": {"apart": {"cart 1 is left of cart 2": lambda t, x, p: x.x2 - x.x1}},
-        "equal": {
-            "latched": {
-                "the carts touch": lambda t, x, p: x.x1 - x.x2,
-                "the carts move together": lambda t, x, p: x.v1 - x.v2,
-            }
-        },
-        "dissipated": {"energy": energy},
-        "across": {
-            "bounce": {
-                "momentum": momentum,
-                "restitution": lambda t, minus, plus, p: plus.v2 - plus.v1 - p.e * (minus.v1 - minus.v2),
+        "laws": Laws(
+            invariant={"apart": {"cart 1 is left of cart 2": lambda t, x, p: x.x2 - x.x1}},
+            equal={
+                "latched": {
+                    "the carts touch": lambda t, x, p: x.x1 - x.x2,
+                    "the carts move together": lambda t, x, p: x.v1 - x.v2,
+                }
             },
-            "latch": {"momentum": momentum},
-        },
+            dissipated={"energy": energy},
+            across={
+                "bounce": {
+                    "momentum": momentum,
+                    "restitution": lambda t, minus, plus, p: plus.v2 - plus.v1 - p.e * (minus.v1 - minus.v2),
+                },
+                "latch": {"momentum": momentum},
+            },
+        ),
     }
 
     def inverted(t, x, p):
@@ -339,13 +347,15 @@ def gear_pair() -> Subject:
 
     known = {
         "states": {"q": (-1.0, 1.0), "v": (-2.0, 2.0)},
-        "invariant": {
-            "free": {"the teeth are apart": lambda t, x, p: p.b - np.abs(x.q)},
-            "right": {"the right flanks touch": lambda t, x, p: x.q - p.b},
-            "left": {"the left flanks touch": lambda t, x, p: -p.b - x.q},
-        },
-        "dissipated": {"energy": (energy, lambda t, x, p: (p.F + p.A * np.cos(p.w * t)) * x.v)},
-        "continuous": ("touch right", "leave right", "touch left", "leave left"),
+        "laws": Laws(
+            invariant={
+                "free": {"the teeth are apart": lambda t, x, p: p.b - np.abs(x.q)},
+                "right": {"the right flanks touch": lambda t, x, p: x.q - p.b},
+                "left": {"the left flanks touch": lambda t, x, p: -p.b - x.q},
+            },
+            dissipated={"energy": (energy, lambda t, x, p: (p.F + p.A * np.cos(p.w * t)) * x.v)},
+            continuous=("touch right", "leave right", "touch left", "leave left"),
+        ),
     }
 
     def with_force(s, side, force):
@@ -424,12 +434,14 @@ def sinai_billiard() -> Subject:
     known = {
         "states": {"x": (-1.0, 1.0), "y": (-1.0, 1.0)},
         "t_span": (0.0, 5.0),
-        "invariant": {
-            "in the box": lambda t, x, p: p.a - np.maximum(np.abs(x.x), np.abs(x.y)),
-            "outside the disc": lambda t, x, p: np.hypot(x.x, x.y) - p.r,
-        },
-        "conserved": {"speed": lambda t, x, p: np.hypot(x.u, x.v)},
-        "elastic": ("u", "v"),
+        "laws": Laws(
+            invariant={
+                "in the box": lambda t, x, p: p.a - np.maximum(np.abs(x.x), np.abs(x.y)),
+                "outside the disc": lambda t, x, p: np.hypot(x.x, x.y) - p.r,
+            },
+            conserved={"speed": lambda t, x, p: np.hypot(x.u, x.v)},
+            elastic=("u", "v"),
+        ),
     }
 
     def once(t, x, p):

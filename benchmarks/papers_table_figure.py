@@ -17,7 +17,7 @@ import numpy as np
 import models
 from benchmarks.common import table
 from hybrid import DOP853, HybridSystem, Taylor
-from hybrid.accuracy.averages import running_tapered_mean
+from hybrid.measures.averages import running_tapered_mean
 from hybrid.plot import COLOURS
 from lyapunov import lyapunov_spectrum
 from lyapunov.study.impact import (

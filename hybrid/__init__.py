@@ -13,20 +13,17 @@ from hybrid.accuracy.work_precision import WorkPrecision, work_precision
 from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError, HybridError, ModelError
 from hybrid.expression.table import Table
+from hybrid.orbits.continuation.bifurcation_curve import BifurcationCurve, CodimensionTwo
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
-from hybrid.orbits.continuation.continue_bifurcation import (
-    BifurcationCurve,
-    CodimensionTwo,
-    continue_bifurcation,
-)
+from hybrid.orbits.continuation.continue_bifurcation import continue_bifurcation
 from hybrid.orbits.continuation.continue_orbit import continue_orbit
 from hybrid.orbits.continuation.switch_branch import switch_branch
 from hybrid.orbits.diagrams.continue_all import continue_all
 from hybrid.orbits.diagrams.diagram import Diagram
 from hybrid.orbits.diagrams.saved import open_branch, open_diagram
+from hybrid.orbits.equilibria.bifurcation_curve import EquilibriumCurve, SpecialEquilibrium
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation, EquilibriumBranch
 from hybrid.orbits.equilibria.continue_equilibrium import continue_equilibrium
-from hybrid.orbits.equilibria.curves import EquilibriumCurve, SpecialEquilibrium
 from hybrid.orbits.equilibria.equilibrium import Equilibrium, equilibrium
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.periodic_orbit import periodic_orbit

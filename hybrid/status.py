@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Self
 
 import attrs
 
@@ -19,6 +19,9 @@ PLAIN = "Reached the end."
 class StatusCode(IntEnum):
     """Why a run ended.
 
+    Each code is one row: its number, what its status says, with places for the facts of a run, and what to
+    do. Where several things lead to one code, the others say theirs where they are found.
+
     Examples
     --------
     >>> import hybrid, models
@@ -29,27 +32,122 @@ class StatusCode(IntEnum):
     'SUCCESS'
     """
 
-    SUCCESS = codes.DONE
-    MAX_STEPS = codes.MAX_STEPS
-    MAX_JUMPS = codes.MAX_JUMPS
-    STEP_TOO_SMALL = codes.STEP_TOO_SMALL
-    NON_FINITE = codes.NON_FINITE
-    ACCUMULATION = codes.ACCUMULATION
-    STUCK = codes.STUCK
-    TERMINAL = codes.TERMINAL
-    AMBIGUOUS_ORDER = 99
-    SINGULAR_SALTATION = 100
+    message: str
+    remedy: str
+    complete: bool
+
+    def __new__(cls, number: int, message: str = "", remedy: str = "", complete: bool = False) -> Self:
+        """A code with its number, what it mostly says, and whether the result is complete and valid."""
+        code = int.__new__(cls, number)
+        code._value_ = number
+        code.message, code.remedy, code.complete = message, remedy, complete
+        return code
+
+    SUCCESS = codes.DONE, PLAIN, "", True
+    MAX_STEPS = (
+        codes.MAX_STEPS,
+        "The limit of steps was reached {where}.",
+        "Raise max_steps of the solver, loosen its tolerances, or check whether the mode is stiff.",
+    )
+    MAX_JUMPS = (
+        codes.MAX_JUMPS,
+        "The limit of jumps was reached {where}.",
+        "Raise max_jumps, or check whether the jumps accumulate.",
+    )
+    STEP_TOO_SMALL = (
+        codes.STEP_TOO_SMALL,
+        "No step was small enough for the tolerance {where}.",
+        "Loosen rtol and atol; if the field is singular or discontinuous there, add a transition.",
+    )
+    NON_FINITE = (
+        codes.NON_FINITE,
+        "The field or the state became infinite or nan {where}.",
+        "Check the model there; a field must also be defined slightly beyond the guards of its mode, as "
+        "np.maximum(depth, 0)**1.5 is.",
+    )
+    ACCUMULATION = (
+        codes.ACCUMULATION,
+        "After {last} the state rests on its guard {where} and the field pushes it through the guard: jumps "
+        "with no time between them accumulate.",
+        "Add a mode for the limit (rest, stick, slide) and name it: Transition(..., accumulates_to=...).",
+    )
+    STUCK = (
+        codes.STUCK,
+        "Jumps repeat endlessly {where}: {names}, then the first again. Each jump takes the state beyond the "
+        "guard of the next.",
+        "Change the resets so that one of them leaves the state before the next guard, or give a guard a "
+        "condition (when=).",
+    )
+    TERMINAL = (
+        codes.TERMINAL,
+        "Ended by {last} {where}.",
+        "That transition has no target mode, so the run stops there.",
+    )
+    AMBIGUOUS_ORDER = (
+        99,
+        "{count} times two guards were reached together and the order of their transitions mattered; the one "
+        "listed first was fired first.",
+        "Choose the order in which the transitions are listed and declare HybridSystem(listed_order=True), "
+        "or add one for the corner.",
+    )
+    SINGULAR_SALTATION = (
+        100,
+        "{count} of {jumps} jumps had no saltation matrix: they grazed exactly, or were the limit of several "
+        "transitions that accumulate in turn.",
+        "The tangent vectors are not valid after these jumps. Move the parameters away from the grazing.",
+    )
     NOT_CONVERGED = 101
     NOT_RUN = 102
-    DISCONTINUOUS_FIELD = 103
-    INTERRUPTED = 104
-    INDISTINCT_TANGENTS = 105
+    DISCONTINUOUS_FIELD = (
+        103,
+        "Reached the end, but {places}: tangent vectors, and results computed from them, are not valid "
+        "beyond such a jump.",
+        "hybrid.split(system) makes modes joined by guards of a field that is written with NumPy functions, "
+        "with the sliding modes between them.",
+    )
+    INTERRUPTED = (
+        104,
+        "Interrupted {where}.",
+        "The result holds everything up to that time. An arc goes on from its end, "
+        "simulate(system, arc.end, (arc.end.t, t1)); or call again.",
+    )
+    INDISTINCT_TANGENTS = (
+        105,
+        "{count} times the tangent vectors became parallel to rounding; the exponents after the first are "
+        "not known.",
+        "Shorten the steps by max_step= of the solver, or ask for fewer exponents.",
+    )
     FAILED = 106
-    INFINITE_SLOPE = 107
-    ROUNDED_TIME = 108
-    OUT_OF_MEMORY = 109
-    START_BEYOND = 110
-    DELAY_FULL = 111
+    INFINITE_SLOPE = (
+        107,
+        "{where} The slope of {powers} is infinite where its base is zero: steps in time lose digits of the "
+        "tangent vectors there, and results computed from them are not valid.",
+    )
+    ROUNDED_TIME = (
+        108,
+        "Reached the end, but the time is so large that its rounding changes the field, a guard or a reset: "
+        "up to {tolerances:.2g} times the tolerance in one step or jump.",
+        "Shift the origin of time, or loosen rtol and atol to what the result needs.",
+    )
+    OUT_OF_MEMORY = (
+        109,
+        "The steps and jumps that the run keeps fill a third of this machine's memory {where}.",
+        "The result holds everything up to that time. Ask for the states at given times with samples=: then "
+        "neither the steps nor, without keep_jumps=True, the jumps are kept.",
+    )
+    START_BEYOND = (
+        110,
+        "Reached the end. The start lies beyond {guards} crossed there and never {fires} in this run. A run "
+        "from the near side would have left this motion.",
+        "Start before the guard, or in the mode behind the guard. Without mode= the guards choose the mode.",
+        True,
+    )
+    DELAY_FULL = (
+        111,
+        "The delay of transition {name!r}, {told}, has {places} places, and one more would be under way "
+        "{where}.",
+        "Raise places= of the Delay.",
+    )
 
 
 @attrs.frozen
@@ -77,7 +175,7 @@ class Status:
     @property
     def ok(self) -> bool:
         """Whether the result is complete and valid."""
-        return self.code in (StatusCode.SUCCESS, StatusCode.START_BEYOND)
+        return self.code.complete
 
     @property
     def brief(self) -> str:
@@ -92,15 +190,17 @@ class Status:
         return f"{text} {self.remedy}" if self.remedy else text
 
 
+def told(code: StatusCode, remedy: str | None = None, /, **facts: Any) -> Status:
+    """What the row of a code says of a run with these facts, with its remedy or another one."""
+    return Status(code, code.message.format(**facts), code.remedy if remedy is None else remedy)
+
+
 def noting(status: Status, *sentences: str) -> Status:
     """The status of a complete run with more to say of it, before what it says already."""
     rest = status.message.removeprefix(PLAIN).strip()
     return attrs.evolve(status, message=" ".join(filter(None, [PLAIN, *sentences, rest])))
 
 
-NAME_THE_LIMIT = (
-    "Add a mode for the limit (rest, stick, slide) and name it: Transition(..., accumulates_to=...)."
-)
 # Of equations that have been split: nobody has written a transition that could name a mode.
 REST_OF_EQUATIONS = (
     "These transitions come from switches in the equations, such as np.sign, and no mode is derived in which "
@@ -124,54 +224,14 @@ def run_status(
     ``transition`` names the last transition, if any, and ``derived`` says that it comes from a switch in the
     equations. ``bare_time`` says that the mode depends on time and no forcing period is declared.
     """
-    if code == StatusCode.SUCCESS:
-        return SUCCESS
+    kind, remedy = StatusCode(code), None
+    if kind == StatusCode.ACCUMULATION and derived:
+        remedy = REST_OF_EQUATIONS
+    if kind == StatusCode.STEP_TOO_SMALL and bare_time:
+        late = "This mode depends on time, and large times are rounded coarsely."
+        remedy = f"{kind.remedy} {late} {DECLARE_PERIOD}"
     last = f"transition {transition!r}" if transition else "a transition"
-    texts = {
-        StatusCode.MAX_STEPS: (
-            f"The limit of steps was reached {where}.",
-            "Raise max_steps of the solver, loosen its tolerances, or check whether the mode is stiff.",
-        ),
-        StatusCode.MAX_JUMPS: (
-            f"The limit of jumps was reached {where}.",
-            "Raise max_jumps, or check whether the jumps accumulate.",
-        ),
-        StatusCode.STEP_TOO_SMALL: (
-            f"No step was small enough for the tolerance {where}.",
-            "Loosen rtol and atol; if the field is singular or discontinuous there, add a transition."
-            + (
-                f" This mode depends on time, and large times are rounded coarsely. {DECLARE_PERIOD}"
-                if bare_time
-                else ""
-            ),
-        ),
-        StatusCode.NON_FINITE: (
-            f"The field or the state became infinite or nan {where}.",
-            "Check the model there; a field must also be defined slightly beyond the guards of its mode, "
-            "as np.maximum(depth, 0)**1.5 is.",
-        ),
-        StatusCode.ACCUMULATION: (
-            f"After {last} the state rests on its guard {where} and the field pushes it through the guard: "
-            "jumps with no time between them accumulate.",
-            REST_OF_EQUATIONS if derived else NAME_THE_LIMIT,
-        ),
-        StatusCode.INTERRUPTED: (
-            f"Interrupted {where}.",
-            "The result holds everything up to that time. An arc goes on from its end, "
-            "simulate(system, arc.end, (arc.end.t, t1)); or call again.",
-        ),
-        StatusCode.OUT_OF_MEMORY: (
-            f"The steps and jumps that the run keeps fill a third of this machine's memory {where}.",
-            "The result holds everything up to that time. Ask for the states at given times with samples=: "
-            "then neither the steps nor, without keep_jumps=True, the jumps are kept.",
-        ),
-        StatusCode.TERMINAL: (
-            f"Ended by {last} {where}.",
-            "That transition has no target mode, so the run stops there.",
-        ),
-    }
-    kind = StatusCode(code)
-    return Status(kind, *texts[kind])
+    return told(kind, remedy, where=where, last=last)
 
 
 def chatter_status(where: str, names: Sequence[str], *, derived: bool) -> Status:
@@ -179,13 +239,13 @@ def chatter_status(where: str, names: Sequence[str], *, derived: bool) -> Status
 
     ``derived`` says that all of them come from switches in the equations.
     """
-    told = f"transition {names[0]!r}" if len(names) == 1 else "transitions " + ", ".join(map(repr, names))
+    fired = f"transition {names[0]!r}" if len(names) == 1 else "transitions " + ", ".join(map(repr, names))
     in_turn = "" if len(names) == 1 else " in turn"
     return Status(
         StatusCode.ACCUMULATION,
-        f"Jumps of {told}{in_turn} accumulate {where}: the times between jumps become ever shorter, "
+        f"Jumps of {fired}{in_turn} accumulate {where}: the times between jumps become ever shorter, "
         "so infinitely many jumps take a finite time.",
-        REST_OF_EQUATIONS if derived else NAME_THE_LIMIT,
+        REST_OF_EQUATIONS if derived else StatusCode.ACCUMULATION.remedy,
     )
 
 
@@ -195,56 +255,28 @@ def stuck_status(where: str, transitions: Sequence[Transition], facing: bool) ->
     ``facing`` says that two modes send the state back to each other across the same guard.
     """
     names = ", ".join(repr(transition.name) for transition in transitions)
-    message = f"Jumps repeat endlessly {where}: {names}, then the first again."
-    if facing:
-        return Status(
-            StatusCode.STUCK,
-            f"{message[:-1]}: the fields on both sides point towards the guard.",
-            "Add a sliding mode, or derive one with hybrid.filippov.",
-        )
+    if not facing:
+        return told(StatusCode.STUCK, where=where, names=names)
     return Status(
         StatusCode.STUCK,
-        f"{message} Each jump takes the state beyond the guard of the next.",
-        "Change the resets so that one of them leaves the state before the next guard, or give a guard a "
-        "condition (when=).",
-    )
-
-
-def full_status(where: str, name: str, places: int, told: str) -> Status:
-    """Status of a run in which more is under way than the delay of a transition has places for.
-
-    ``told`` says in few words when the transition fires.
-    """
-    return Status(
-        StatusCode.DELAY_FULL,
-        f"The delay of transition {name!r}, {told}, has {places} places, and one more would be under way "
-        f"{where}.",
-        "Raise places= of the Delay.",
+        f"Jumps repeat endlessly {where}: {names}, then the first again: the fields on both sides point "
+        "towards the guard.",
+        "Add a sliding mode, or derive one with hybrid.filippov.",
     )
 
 
 def beyond_status(names: Sequence[str]) -> Status:
     """Status of a complete run whose start lies beyond guards that have not fired in it."""
-    one, listed = len(names) == 1, ", ".join(map(repr, names))
-    guards, counts, fires = ("guard", "which counts", "fires") if one else ("guards", "which count", "fire")
-    return Status(
-        StatusCode.START_BEYOND,
-        f"{PLAIN} The start lies beyond the {guards} of {listed}, {counts} as crossed there and never "
-        f"{fires} in this run. A run from the near side would have left this motion.",
-        "Start before the guard, or in the mode behind the guard. Without mode= the guards choose the mode.",
-    )
+    listed = ", ".join(map(repr, names))
+    one = len(names) == 1
+    guards = f"the guard of {listed}, which counts as" if one else f"the guards of {listed}, which count as"
+    return told(StatusCode.START_BEYOND, guards=guards, fires="fires" if one else "fire")
 
 
 def discontinuous_status(jumps: Mapping[str, str]) -> Status:
     """Status of a run with tangent vectors if fields jump; ``jumps`` maps modes to the places, in words."""
     places = [f"the field of mode {mode!r} jumps {where}" for mode, where in jumps.items()]
-    return Status(
-        StatusCode.DISCONTINUOUS_FIELD,
-        f"Reached the end, but {', and '.join(places)}: tangent vectors, and results computed from them, are "
-        "not valid beyond such a jump.",
-        "hybrid.split(system) makes modes joined by guards of a field that is written with NumPy functions, "
-        "with the sliding modes between them.",
-    )
+    return told(StatusCode.DISCONTINUOUS_FIELD, places=", and ".join(places))
 
 
 def late_status(tolerances: float, *, declared: bool) -> Status:
@@ -252,13 +284,9 @@ def late_status(tolerances: float, *, declared: bool) -> Status:
 
     ``declared`` says that the system has a forcing period.
     """
-    others = "shift the origin of time, or loosen rtol and atol to what the result needs."
-    return Status(
-        StatusCode.ROUNDED_TIME,
-        "Reached the end, but the time is so large that its rounding changes the field, a guard or a reset: "
-        f"up to {tolerances:.2g} times the tolerance in one step or jump.",
-        others.capitalize() if declared else f"{DECLARE_PERIOD} Otherwise {others}",
-    )
+    others = StatusCode.ROUNDED_TIME.remedy
+    remedy = others if declared else f"{DECLARE_PERIOD} Otherwise {others[0].lower()}{others[1:]}"
+    return told(StatusCode.ROUNDED_TIME, remedy, tolerances=tolerances)
 
 
 def steep_status(where: str, powers: Mapping[str, str], *, inside: bool) -> Status:
@@ -278,12 +306,8 @@ def steep_status(where: str, powers: Mapping[str, str], *, inside: bool) -> Stat
             "hybrid.split(system) makes guards of what switches inside of a mode: series in the root of a "
             "guard carry tangent vectors across it."
         )
-    return Status(
-        StatusCode.INFINITE_SLOPE,
-        f"{where} The slope of {named} is infinite where its base is zero: steps in time lose digits of the "
-        "tangent vectors there, and results computed from them are not valid.",
-        f"{remedy} Runs without tangent vectors are not affected.",
-    )
+    remedy = f"{remedy} Runs without tangent vectors are not affected."
+    return told(StatusCode.INFINITE_SLOPE, remedy, where=where, powers=named)
 
 
 def apart_status(jumps: int, others: int) -> Status:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.accuracy.averages import Array
+from hybrid.measures.averages import Array
 
 # Slots of the state of an accumulator.
 CLOSED = 0

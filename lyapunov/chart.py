@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property, partial
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import attrs
 import numpy as np
@@ -17,14 +17,15 @@ from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import silent
 from hybrid.errors import ArgumentError, HybridError
 from hybrid.orbits.closing import advance_to_close
+from hybrid.shared import shares
 from hybrid.simulation.trajectory import Common, Trajectory
-from hybrid.solvers import Solver
 from hybrid.status import Status
 from hybrid.sweep.rows import At, Place, Rows, rows_of
 from hybrid.sweep.sheet import Labels
 from hybrid.transform.aged import aged, without_age
+from lyapunov.asked import Averaging
 from lyapunov.directions import first_vectors, number_of_exponents, orthonormal_at_start
-from lyapunov.spectrum import Estimates, Flight, Means, interval_length
+from lyapunov.estimates import Estimates, Flight, Means, interval_length
 from lyapunov.together import alike, means_together, result_of
 
 if TYPE_CHECKING:
@@ -50,19 +51,13 @@ RESULTS = (
 
 
 @arguments.without_tolerances
+@shares(Averaging)
 def chart(
     system: HybridSystem,
     over: Any,
     x0: ArrayLike | Mapping[str, float],
     *,
-    mode: str | None = None,
-    parameters: Mapping[str, float] | None = None,
     k: int | None = 1,
-    intervals: int = 1000,
-    interval: float | None = None,
-    transient: int = 200,
-    t0: float = 0.0,
-    solver: Solver | None = None,
     section: int = 0,
     at: At = None,
     outputs: Iterable[str] = (),
@@ -70,6 +65,7 @@ def chart(
     store: str | PathLike[str] | None = None,
     executor: Any = None,
     progress: bool | None = None,
+    **asked: Unpack[Averaging],
 ) -> xarray.Dataset:
     """Lyapunov exponents at every point of a grid of parameters and starts, by :func:`hybrid.sweep`.
 
@@ -91,8 +87,6 @@ def chart(
     k
         Number of exponents, 1 to n, or None for all. By default the largest alone, where
         :func:`lyapunov.lyapunov_spectrum` computes all.
-    intervals, interval, transient, solver
-        As for :func:`lyapunov.lyapunov_spectrum`.
     section
         Number of points of the section to keep per row, for a bifurcation diagram.
     at
@@ -139,14 +133,15 @@ def chart(
         raise ArgumentError(
             "outputs are computed at the points of a section, and this chart has none. Give section=100 too."
         )
+    interval = asked["interval"]
     rows = rows_of(
         system,
         over,
         x0,
-        mode=mode,
-        parameters=parameters,
-        t0=t0,
-        solver=solver,
+        mode=asked["mode"],
+        parameters=asked["parameters"],
+        t0=asked["t0"],
+        solver=asked["solver"],
         points=section,
         at=at,
         continue_from=continue_from,
@@ -156,9 +151,9 @@ def chart(
     task = Exponents(
         rows,
         k=number_of_exponents(system, k),
-        intervals=arguments.count("intervals", intervals, 1),
+        intervals=arguments.count("intervals", asked["intervals"], 1),
         interval=None if interval is None else arguments.positive("interval", interval, "be a positive time"),
-        transient=arguments.count("transient", transient, 1 if rows.along else 0),
+        transient=arguments.count("transient", asked["transient"], 1 if rows.along else 0),
         points=section,
     )
     return sweep(task, over, store=store, executor=executor, progress=progress)

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import HybridSystem, Status, arguments
-from hybrid.accuracy.averages import TaperedMean, standard_error, taper_inflation
 from hybrid.display.progress import progress_bar
 from hybrid.display.tables import counted
+from hybrid.measures.averages import TaperedMean, standard_error, taper_inflation
 from hybrid.orbits.triangles import Interval, Triangles
+from hybrid.shared import shares
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.labelled import Names, attributes, with_counters
-from hybrid.simulation.trajectory import Trajectory, start
-from hybrid.solvers import Solver
+from hybrid.simulation.trajectory import Trajectory
 from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
 from hybrid.transform.aged import aged
+from lyapunov.asked import Averaging, begun, numbers_of
 from lyapunov.directions import generic_directions
-from lyapunov.spectrum import interval_length
+from lyapunov.estimates import interval_length
 
 if TYPE_CHECKING:
     import xarray
@@ -117,18 +117,13 @@ class CovariantVectors:
 
 
 @growing
+@shares(Averaging)
 def covariant_vectors(
     system: HybridSystem,
     x0: ArrayLike,
     *,
-    mode: str | None = None,
-    parameters: Mapping[str, float] | None = None,
-    intervals: int = 1000,
-    interval: float | None = None,
-    transient: int = 200,
-    t0: float = 0.0,
-    solver: Solver | None = None,
     progress: bool = False,
+    **asked: Unpack[Averaging],
 ) -> CovariantVectors:
     r"""Covariant Lyapunov vectors by the method of Ginelli and others.
 
@@ -147,11 +142,10 @@ def covariant_vectors(
 
     Parameters
     ----------
-    system, x0, mode, parameters, t0, solver
+    system, x0
         As for :func:`hybrid.simulate`.
-    intervals, interval
-        Number of points, and the time between two of them; by default as for
-        :func:`lyapunov.lyapunov_spectrum`.
+    intervals
+        Number of points, which are an interval of time apart.
     transient
         Number of intervals to run before the first point, in which the orbit reaches the attractor and the
         bases settle, and once more after the last point, in which the triangles settle backward. The error of
@@ -188,12 +182,11 @@ def covariant_vectors(
     """
     n = aged(as_system("system", system)).tangent_dimension
     basis = generic_directions(n, n)
-    intervals = arguments.count("intervals", intervals, 1)
-    transient = arguments.count("transient", transient, 0)
+    transient, intervals = numbers_of(asked)
     progress = arguments.flag("progress", progress)
-    trajectory = start(system, x0, t0, mode=mode, parameters=parameters, solver=solver, tangent=basis)
+    trajectory = begun(system, x0, asked, basis)
     total = 2 * transient + intervals
-    length = interval_length(trajectory, interval, total)
+    length = interval_length(trajectory, asked["interval"], total)
     triangles, passed = Triangles(trajectory, length, basis), []
     with trajectory.stop, progress_bar(total, "Covariant vectors", progress) as bar:
         for i, each in enumerate(triangles.following(total)):

@@ -19,8 +19,8 @@ from hybrid.solvers import Solver
 from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
 from hybrid.transform.aged import aged, least_dimension
+from lyapunov.estimates import Flight, interval_length
 from lyapunov.interval import end_at, maps_of
-from lyapunov.spectrum import Flight, interval_length
 
 # By how much two sums of logarithms may differ that are the same but for the error of a run.
 SAME = 1e-9

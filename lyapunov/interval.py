@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.accuracy.averages import MAX_BATCHES
 from hybrid.kernels.types.kinds import CUBE, INDEX_MATRIX, INDICES, MATRIX, REAL, VECTOR
 from hybrid.kernels.types.structure import Layout, Structure
+from hybrid.measures.averages import MAX_BATCHES
 from hybrid.simulation.memory import MOST_LAYOUTS
 
 # Intervals in a round. Means are summed by rounds, so that their rounding does not depend on where a burst of

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 from hybrid import ArgumentError, HybridSystem, arguments
-from hybrid.accuracy.averages import Array, standard_error_from_batches, taper_inflation
+from hybrid.measures.averages import Array, standard_error_from_batches, taper_inflation
 from hybrid.system.members import shared_name
 
 

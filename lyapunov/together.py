@@ -11,7 +11,7 @@ from hybrid.compiler.cache.loader import load_kernels
 from hybrid.kernels.types import codes
 from hybrid.simulation.crew import Crew, together
 from hybrid.status import StatusCode
-from lyapunov.spectrum import Estimates, Flight, Means
+from lyapunov.estimates import Estimates, Flight, Means
 
 Result = TypeVar("Result")
 

@@ -3,29 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from typing import Any, Unpack
 
 import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hybrid import ArgumentError, HybridSystem, Status, StatusCode, arguments
-from hybrid.accuracy.averages import running_tapered_mean
 from hybrid.compiler.cache.loader import load_kernels
 from hybrid.display.progress import Progress, progress_bar
 from hybrid.kernels.types import codes
+from hybrid.measures.averages import running_tapered_mean
+from hybrid.shared import shares
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import Bursts
 from hybrid.simulation.labelled import Names
 from hybrid.simulation.trajectory import Trajectory, start
-from hybrid.solvers import Solver
 from hybrid.system.entries import has_age
 from hybrid.system.graph import as_system
 from hybrid.system.growth import growing
 from hybrid.transform.aged import aged, with_age
+from lyapunov.asked import Averaging, begun, numbers_of
+from lyapunov.estimates import interval_length
 from lyapunov.interval import INTERVALS_AT_ONCE, end_at
-from lyapunov.spectrum import interval_length
 
 # The renormalised companion has no digits left this many roundings of the state from the orbit, or so near
 # the least of all numbers.
@@ -142,26 +142,21 @@ class TwoOrbitExponents:
 
 
 @growing
+@shares(Averaging, transient=0)
 def two_orbit_exponents(
     system: HybridSystem,
     x0: ArrayLike,
     *,
     separation: float = 1e-8,
     direction: ArrayLike | None = None,
-    mode: str | None = None,
-    parameters: Mapping[str, float] | None = None,
-    intervals: int = 1000,
-    interval: float | None = None,
-    transient: int = 0,
-    t0: float = 0.0,
-    solver: Solver | None = None,
     progress: bool = False,
+    **asked: Unpack[Averaging],
 ) -> TwoOrbitExponents:
     """Estimates of the largest exponent from two neighbouring orbits, without derivatives.
 
     Parameters
     ----------
-    system, x0, mode, parameters, solver
+    system, x0
         As for :func:`hybrid.simulate`.
     separation
         Distance of the companion at the start, in the units of the state. It should be small against the
@@ -170,13 +165,10 @@ def two_orbit_exponents(
     direction
         ``(n,)`` without counters: direction from the reference to the companion, of any length; by default
         all components are equal.
-    intervals, interval
-        Number of intervals to follow the orbits, and their length; by default the forcing period, or for an
-        autonomous system the time scale of its field at the start.
+    intervals
+        Number of intervals to follow the orbits.
     transient
         Number of intervals to run the reference orbit before the companion is placed.
-    t0
-        Time at the start.
     progress
         Whether to show a progress bar.
 
@@ -206,14 +198,13 @@ def two_orbit_exponents(
     -0.086
     """
     as_system("system", system)
-    intervals = arguments.count("intervals", intervals, 1)
-    transient = arguments.count("transient", transient, 0)
+    transient, intervals = numbers_of(asked)
     separation = arguments.positive("separation", separation, "be a positive distance")
     progress = arguments.flag("progress", progress)
     state = with_age(system, system.variables.state_values("x0", x0))
-    reference = start(aged(system), state, t0, mode=mode, parameters=parameters, solver=solver)
+    reference = begun(aged(system), state, asked)
     offset = separation * _direction(direction, system, reference)
-    length = interval_length(reference, interval, transient + intervals)
+    length = interval_length(reference, asked["interval"], transient + intervals)
     unit = Names(system.state_names, system.units).rate.get("units", "")
     load_kernels("lyapunov.kernels")
     with reference.stop, progress_bar(transient + intervals, "Two orbits", progress) as bar:
@@ -222,7 +213,7 @@ def two_orbit_exponents(
         if code != codes.DONE:
             nothing = np.empty(0)
             return TwoOrbitExponents(nothing, nothing, separation, length, status_of(reference, code), unit)
-        companions = [_companion(reference, offset, parameters, solver) for _ in range(2)]
+        companions = [_companion(reference, offset, asked) for _ in range(2)]
         distances, status = _follow(reference, companions, separation, length, intervals, bar)
     free, renormalised = distances.T
     growths = _log_ratio(renormalised, separation) / length
@@ -304,11 +295,11 @@ def _skip(trajectory: Trajectory, intervals: int, interval: float) -> int:
 def _companion(
     reference: Trajectory,
     offset: np.ndarray,
-    parameters: Mapping[str, float] | None,
-    solver: Solver | None,
+    asked: Averaging,
 ) -> Trajectory:
     """A trajectory that starts beside the current point of the reference, at exactly the same time."""
     place = (reference.system, reference.x + offset, reference.t)
+    parameters, solver = asked["parameters"], asked["solver"]
     try:
         companion = start(*place, parameters=parameters, solver=solver, by_guards=True)
     except ArgumentError:

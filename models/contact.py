@@ -8,67 +8,44 @@ restitution.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
-from math import cos, cosh, exp, expm1, gamma, log1p, pi, sin, sinh, sqrt, tan, tanh
-from typing import Any, ClassVar, Protocol, runtime_checkable
+from math import expm1, gamma, log1p, pi, sqrt
+from typing import Any, ClassVar
 
 from hybrid import Guard, Laws, Mode, Reset, Transition, arguments
 from models.contact_energy import (
     Bodies,
-    hertz_energy,
     hertz_force,
     hunt_crossley_force,
     hunt_crossley_power,
-    kelvin_voigt_force,
-    kelvin_voigt_power,
     laws_apart,
-    negative,
     restitution_error,
     soft_laws,
-    spring_energy,
 )
+from models.contact_motion import (
+    ContactLaw,
+    collided,
+    free,
+    in_and_out,
+    pushed,
+    restitution_of,
+    root,
+    soft_outputs,
+)
+from models.kelvin_voigt import KelvinVoigt
 
-# Restitution of a Kelvin-Voigt contact with critical damping; a smaller one needs damping above critical.
-CRITICAL_RESTITUTION = exp(-2)
-RESTITUTION = "satisfy 0 < e <= 1 in a compliant contact (in a rigid one e may be 0)"
-# Between these angles the restitution takes every value of floating point.
-LEAST_ANGLE, LARGEST_ANGLE = 1e-8, 350.0
-
-
-@runtime_checkable
-class ContactLaw(Protocol):
-    """A law of contact: its parameters, and the modes and transitions of two bodies in contact.
-
-    In the mode ``free`` the bodies are apart; contact begins with the transition ``impact``.
-    """
-
-    @property
-    def parameters(self) -> dict[str, float]:
-        """Default values by name."""
-        ...
-
-    @property
-    def units(self) -> Mapping[str, str]:
-        """Units of the parameters by name, for a state in m and m/s."""
-        ...
-
-    def modes(self, bodies: Bodies) -> list[Mode]:
-        """The mode ``free`` and those in which the bodies touch."""
-        ...
-
-    def transitions(self, bodies: Bodies) -> list[Transition]:
-        """The transition ``impact`` and those that lead back to ``free``."""
-        ...
-
-    def outputs(self, bodies: Bodies) -> dict[str, Any]:
-        """The energy, and the force of the contact if there is one."""
-        ...
-
-    def laws(self, bodies: Bodies) -> Laws:
-        """What is known of gap, energy and impact."""
-        ...
+__all__ = [
+    "ContactLaw",
+    "Hertz",
+    "HuntCrossley",
+    "KelvinVoigt",
+    "Rigid",
+    "after_collision",
+    "hertz_stiffness",
+    "matched_laws",
+]
 
 
 @dataclass(frozen=True)
@@ -97,11 +74,11 @@ class Rigid:
 
     def modes(self, bodies: Bodies) -> list[Mode]:
         """``free``."""
-        return [_free(bodies)]
+        return [free(bodies)]
 
     def transitions(self, bodies: Bodies) -> list[Transition]:
         """``impact``."""
-        collision = Reset(partial(_collided, bodies))
+        collision = Reset(partial(collided, bodies))
         return [Transition("free", "free", Guard(bodies.penetration, +1), collision, name="impact")]
 
     def outputs(self, bodies: Bodies) -> dict[str, Any]:
@@ -140,15 +117,15 @@ class Hertz:
 
     def modes(self, bodies: Bodies) -> list[Mode]:
         """``free`` and ``contact``."""
-        return [_free(bodies), _pushed(bodies, hertz_force)]
+        return [free(bodies), pushed(bodies, hertz_force)]
 
     def transitions(self, bodies: Bodies) -> list[Transition]:
         """``impact`` and ``release``."""
-        return _in_and_out(bodies)
+        return in_and_out(bodies)
 
     def outputs(self, bodies: Bodies) -> dict[str, Any]:
         """Force and energy."""
-        return _soft_outputs(bodies, hertz_force)
+        return soft_outputs(bodies, hertz_force)
 
     def laws(self, bodies: Bodies) -> Laws:
         """Energy with that of the contact; no force at the impact."""
@@ -225,7 +202,7 @@ class HuntCrossley:
         ArgumentError
             If ``e`` is out of its range.
         """
-        e = _restitution(e)
+        e = restitution_of(e)
         K, speed = arguments.positive("K", K), arguments.positive("speed", speed)
         if e == 1:
             return cls(K, 0.0)
@@ -236,7 +213,7 @@ class HuntCrossley:
 
         # The root is u = 3/2 (1 - e) to first order, and lies above a sixth of that.
         least = -log1p(-e * (1 - e) / 4)
-        w = _root(lambda w: log1p(u(w)) + w - (1 + e) * u(w), least, (1 + e) / e)
+        w = root(lambda w: log1p(u(w)) + w - (1 + e) * u(w), least, (1 + e) / e)
         return cls(K, arguments.result("alpha", 2 * u(w) / 3 / speed))
 
     @property
@@ -247,128 +224,21 @@ class HuntCrossley:
     def modes(self, bodies: Bodies) -> list[Mode]:
         """``free`` and ``contact``."""
         return [
-            _free(bodies),
-            _pushed(bodies, hunt_crossley_force),
+            free(bodies),
+            pushed(bodies, hunt_crossley_force),
         ]
 
     def transitions(self, bodies: Bodies) -> list[Transition]:
         """``impact`` and ``release``."""
-        return _in_and_out(bodies)
+        return in_and_out(bodies)
 
     def outputs(self, bodies: Bodies) -> dict[str, Any]:
         """Force and energy."""
-        return _soft_outputs(bodies, hunt_crossley_force)
+        return soft_outputs(bodies, hunt_crossley_force)
 
     def laws(self, bodies: Bodies) -> Laws:
         """Energy with that of the contact, and its loss; no force at the impact."""
         return soft_laws(bodies, partial(hunt_crossley_power, bodies))
-
-
-@dataclass(frozen=True)
-class KelvinVoigt:
-    r"""Spring and damper in parallel: :math:`F = k\, \delta + c\, \dot\delta`.
-
-    At the impact the force jumps to :math:`c v`. The contact ends where the force vanishes; if it ended at
-    :math:`\delta = 0`, the force would pull at the end. The surfaces are still deformed when the contact
-    ends, and the bodies move freely in the mode ``recovery`` until :math:`\delta = 0`. If they approach again
-    before that, contact resumes as soon as the force would push.
-
-    Modes ``free``, ``contact``, ``recovery``; transitions ``impact``, ``release`` (into ``recovery``),
-    ``parting`` (into ``free``) and ``return`` (into ``contact``).
-
-    Parameters
-    ----------
-    k, c
-        Stiffness, N/m, and damping, N s/m.
-    """
-
-    units: ClassVar[Mapping[str, str]] = {"k": "N/m", "c": "N s/m"}
-    k: float
-    c: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "k", arguments.positive("k", self.k))
-        object.__setattr__(self, "c", arguments.not_negative("c", self.c))
-
-    @classmethod
-    def from_restitution(cls, e: float, mass: float, duration: float) -> KelvinVoigt:
-        r"""The law with restitution ``e``, ``0 < e <= 1``, at any speed, and a given duration of contact.
-
-        With the damping ratio :math:`\zeta = \cos\theta` the force vanishes after
-        :math:`T = 2 \theta / (\omega \sin\theta)`, :math:`\omega^2 = k / m`, and
-        :math:`e = \exp(-2 \theta \cot\theta)`. Above critical damping, for ``e < exp(-2)``, :math:`\theta` is
-        imaginary.
-
-        Parameters
-        ----------
-        e
-            Coefficient of restitution.
-        mass, duration
-            Reduced mass, kg, and duration of contact, s, for example from :meth:`Hertz.duration`.
-
-        Raises
-        ------
-        ArgumentError
-            If ``e`` is out of its range.
-        """
-        e = _restitution(e)
-        mass, duration = arguments.positive("mass", mass), arguments.positive("duration", duration)
-        if e == 1:
-            omega = pi / duration
-            return cls(arguments.result("k", mass * omega * omega), 0.0)
-        if e > CRITICAL_RESTITUTION:
-            theta = _root(lambda theta: exp(-2 * theta / tan(theta)) - e, LEAST_ANGLE, pi / 2)
-            zeta, omega = cos(theta), 2 * theta / (duration * sin(theta))
-        else:
-            theta = _root(lambda theta: e - exp(-2 * theta / tanh(theta)), LEAST_ANGLE, LARGEST_ANGLE)
-            zeta, omega = cosh(theta), 2 * theta / (duration * sinh(theta))
-        k = arguments.result("k", mass * omega * omega)
-        return cls(k, arguments.result("c", 2 * zeta * omega * mass))
-
-    @property
-    def parameters(self) -> dict[str, float]:
-        """``k`` and ``c``."""
-        return asdict(self)
-
-    def modes(self, bodies: Bodies) -> list[Mode]:
-        """``free``, ``contact`` and ``recovery``."""
-        free = _free(bodies)
-        contact = _pushed(bodies, kelvin_voigt_force)
-        return [free, contact, Mode("recovery", free.field)]
-
-    def transitions(self, bodies: Bodies) -> list[Transition]:
-        """``impact``, ``release``, ``parting`` and ``return``."""
-        force = partial(_force_between, bodies, kelvin_voigt_force)
-        return [
-            Transition("free", "contact", Guard(bodies.penetration, +1), name="impact"),
-            Transition("contact", "recovery", Guard(force, -1), name="release"),
-            Transition("recovery", "free", Guard(bodies.penetration, -1), name="parting"),
-            Transition("recovery", "contact", Guard(force, +1), name="return"),
-        ]
-
-    def outputs(self, bodies: Bodies) -> dict[str, Any]:
-        """Force and energy; while the surfaces recover there is no force, and their energy is lost."""
-        energy = {"free": bodies.energy, "contact": partial(spring_energy, bodies), "recovery": bodies.energy}
-        return {"force": {"contact": partial(_force_between, bodies, kelvin_voigt_force)}, "energy": energy}
-
-    def laws(self, bodies: Bodies) -> Laws:
-        """Energy with that of the spring, and its loss; no force but at the impact."""
-        force = partial(_force_between, bodies, kelvin_voigt_force)
-        contact = Laws(
-            invariant={
-                "contact": {"penetration": bodies.penetration, "force": force},
-                "recovery": {
-                    "penetration": bodies.penetration,
-                    "pull that is left out": partial(negative, force),
-                },
-            },
-            balance={
-                "contact": {"energy": (partial(spring_energy, bodies), partial(kelvin_voigt_power, bodies))},
-                "recovery": {"energy": (bodies.energy, bodies.power)},
-            },
-            continuous=("release", "parting", "return"),
-        )
-        return laws_apart(bodies).joined(contact)
 
 
 def hertz_stiffness(
@@ -421,7 +291,7 @@ def matched_laws(K: float, mass: float, speed: float, e: float = 1.0) -> dict[st
     >>> {name: sorted(law.parameters) for name, law in laws.items()}
     {'rigid': ['e'], 'Kelvin-Voigt': ['c', 'k'], 'Hunt-Crossley': ['K', 'alpha']}
     """
-    e = _restitution(e)
+    e = restitution_of(e)
     hertz = Hertz(K)
     return {
         "rigid": Rigid(e),
@@ -434,57 +304,3 @@ def after_collision(m1: float, m2: float, v1: Any, v2: Any, e: Any) -> tuple[Any
     """Velocities after a collision, which keeps the momentum and turns ``v1 - v2`` into ``-e (v1 - v2)``."""
     impulse = (1 + e) * m1 * m2 / (m1 + m2) * (v1 - v2)
     return v1 - impulse / m1, v2 + impulse / m2
-
-
-def _free(bodies: Bodies) -> Mode:
-    return Mode("free", partial(_apart, bodies))
-
-
-def _pushed(bodies: Bodies, force: Callable[..., Any]) -> Mode:
-    """The mode ``contact`` under a force of ``(penetration, rate, p)``."""
-    return Mode("contact", partial(_pushed_apart, bodies, force))
-
-
-def _soft_outputs(bodies: Bodies, force: Callable[..., Any]) -> dict[str, Any]:
-    """Force and energy of a contact whose force begins and ends with the penetration."""
-    return {
-        "force": {"contact": partial(_force_between, bodies, force)},
-        "energy": {"free": bodies.energy, "contact": partial(hertz_energy, bodies)},
-    }
-
-
-def _apart(bodies, t, x, p):
-    return bodies.field(t, x, p, 0.0)
-
-
-def _pushed_apart(bodies, force, t, x, p):
-    return bodies.field(t, x, p, _force_between(bodies, force, t, x, p))
-
-
-def _force_between(bodies, force, t, x, p):
-    return force(bodies.penetration(t, x, p), bodies.rate(t, x, p), p)
-
-
-def _collided(bodies, t, x, p):
-    return bodies.collided(t, x, p, p.e)
-
-
-def _in_and_out(bodies: Bodies) -> list[Transition]:
-    return [
-        Transition("free", "contact", Guard(bodies.penetration, +1), name="impact"),
-        Transition("contact", "free", Guard(bodies.penetration, -1), name="release"),
-    ]
-
-
-def _restitution(e: float) -> float:
-    found = arguments.not_negative("e", e, RESTITUTION)
-    if not 0 < found <= 1:
-        raise arguments.refusal("e", RESTITUTION, e)
-    return found
-
-
-def _root(function: Callable[[float], float], low: float, high: float) -> float:
-    """Zero of a function that is negative at ``low`` and positive at ``high``, by bisection to rounding."""
-    while low < (middle := (low + high) / 2) < high:
-        low, high = (middle, high) if function(middle) < 0 else (low, middle)
-    return high

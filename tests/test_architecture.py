@@ -35,6 +35,7 @@ ROOMS = (
     "hybrid.errors",
     "hybrid.display",
     "hybrid.arguments",
+    "hybrid.shared",
     "hybrid.kernels",
     "hybrid.system",
     "hybrid.status",

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 import attrs
 import numpy as np
@@ -13,10 +12,10 @@ from numpy.typing import ArrayLike
 
 from hybrid import arguments
 from hybrid.accuracy.answer import QUANTITIES, Answer, as_answer, errors_of, rounding_of
+from hybrid.accuracy.measured import Method, check_clock, measured, own_answer, runner
 from hybrid.display.tables import table
 from hybrid.errors import ArgumentError
 from hybrid.simulation.arc import HybridArc
-from hybrid.simulation.simulate import simulate
 from hybrid.solvers import DOP853, Solver, Taylor, Tsit5
 from hybrid.status import StatusCode
 from hybrid.system.graph import HybridSystem, as_system, check_mode
@@ -31,13 +30,6 @@ METHODS: Mapping[str, Solver] = {"Taylor": Taylor(), "DOP853": DOP853(), "Tsit5"
 # The default reference, and the run of another method from which the error of the reference is estimated.
 REFERENCE = Taylor(rtol=1e-14, atol=1e-16)
 CHECK = DOP853(rtol=1e-13, atol=1e-15)
-# Short runs are repeated for this many seconds: the first ones depend on what ran before them.
-SETTLED = 0.05
-MOST_REPEATS = 1000
-# An error that cannot be told from zero.
-BELOW = "below the reference's"
-
-Method = Solver | Callable[[float], Any]
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -260,7 +252,7 @@ def work_precision(
     system.parameter_values(parameters)
     tangent = arguments.flag("tangent", tangent)
     runs = {
-        name: _run(name, method, system, x0, t_span, mode, parameters, tangent)
+        name: runner(name, method, system, x0, t_span, mode, parameters, tangent)
         for name, method in arguments.mapping("methods", methods, "map names to methods").items()
     }
     if not runs:
@@ -270,7 +262,7 @@ def work_precision(
         raise arguments.refusal("tolerances", "be positive and at least one", tolerances)
     repeats = arguments.count("repeats", repeats, 1)
     longest = arguments.positive("longest", longest, "be a positive number of seconds", infinite=True)
-    _check_clock(clock)
+    check_clock(clock)
     known_errors = {
         arguments.known("reference_error: Quantity", quantity, QUANTITIES, "Quantities"): (
             arguments.not_negative(f"reference_error[{arguments.shown(quantity)}]", value)
@@ -280,7 +272,7 @@ def work_precision(
     n, span = system.dimension, t_span[1] - t_span[0]
     if reference is None:
         truth, check = (
-            as_answer("reference", _own(solver, system, x0, t_span, mode, parameters, tangent), n, span)
+            as_answer("reference", own_answer(solver, system, x0, t_span, mode, parameters, tangent), n, span)
             for solver in (REFERENCE, CHECK)
         )
         floor = errors_of(check, truth)
@@ -297,7 +289,7 @@ def work_precision(
         for tolerance in sorted(levels.tolist(), reverse=True):
             if slow:
                 break
-            row = _measured(name, run, tolerance, truth, (n, span), repeats, longest, clock)
+            row = measured(name, run, tolerance, truth, (n, span), repeats, longest, clock)
             rows.append(row)
             if row.status == StatusCode.INTERRUPTED.name:
                 runs = {}
@@ -317,117 +309,8 @@ def work_precision(
     )
 
 
-@attrs.frozen
-class _Row:
-    method: str
-    tolerance: float
-    errors: Mapping[str, float] = attrs.Factory(dict)
-    seconds: float = np.nan
-    compile_seconds: float = np.nan
-    steps: float = np.nan
-    events: float = np.nan
-    status: str = "SUCCESS"
-
-
-def _run(name: str, method: Method, *problem: Any) -> Callable[[float], Any]:
-    """The method as a function of the tolerance."""
-    if isinstance(method, Solver):
-        ratio = method.atol / method.rtol
-        return lambda rtol: _own(attrs.evolve(method, rtol=rtol, atol=rtol * ratio), *problem)
-    if isinstance(method, type) or not callable(method):
-        raise ArgumentError(
-            f"Method {arguments.shown(name)} must be a solver, Taylor() say, or a function of the tolerance; "
-            f"got {arguments.shown(method)}."
-        )
-    return method
-
-
-def _own(
-    solver: Solver,
-    system: HybridSystem,
-    x0: ArrayLike,
-    t_span: tuple[float, float],
-    mode: str | None,
-    parameters: Mapping[str, float] | None,
-    tangent: bool,
-) -> HybridArc:
-    arc = simulate(
-        system,
-        x0,
-        t_span,
-        mode=mode,
-        parameters=parameters,
-        solver=solver,
-        tangent=tangent,
-        samples=[t_span[1]],
-        keep_jumps=True,
-    )
-    if arc.status.code == StatusCode.INTERRUPTED:
-        raise KeyboardInterrupt
-    return arc
-
-
-def _check_clock(clock: object) -> None:
-    """Whether a function tells the time as a number."""
-    wanted = "be a function without arguments that returns seconds"
-    if not callable(clock) or isinstance(clock, type):
-        raise arguments.refusal("clock", wanted, clock)
-    try:
-        told = clock()
-    except Exception as error:
-        raise arguments.refusal("clock", wanted, clock) from error
-    arguments.number("clock: the time returned", told)
-
-
-def _measured(
-    name: str,
-    run: Callable[[float], Any],
-    tolerance: float,
-    truth: Answer,
-    shape: tuple[int, float],
-    repeats: int,
-    longest: float,
-    clock: Callable[[], float],
-) -> _Row:
-    def timed() -> tuple[Any, float]:
-        start = clock()
-        result = run(tolerance)
-        seconds = clock() - start
-        own = result.seconds if isinstance(result, Answer) else None
-        return result, seconds if own is None else own
-
-    first, begin = float("nan"), clock()
-    # If the first run fails, so does the second, which tells how long that takes without compiling.
-    try:
-        with suppress(Exception):
-            first = timed()[1]
-        begin = clock()
-        result, seconds = timed()
-        times = [seconds]
-        most = repeats if repeats == 1 else max(repeats, MOST_REPEATS)
-        while len(times) < most and times[-1] <= longest:
-            if len(times) >= repeats and sum(times) >= SETTLED:
-                break
-            times.append(timed()[1])
-    except ArgumentError:
-        raise
-    except KeyboardInterrupt:
-        return _Row(name, tolerance, seconds=clock() - begin, status=StatusCode.INTERRUPTED.name)
-    except Exception as error:  # another package's failure is a result of the comparison
-        said = f"{type(error).__name__}: {error}".strip().splitlines()[0]
-        return _Row(name, tolerance, seconds=clock() - begin, status=said)
-    answer = as_answer(f"Method {name!r}: what it returns", result, *shape)
-    seconds = float(np.median(times))
-    return _Row(
-        method=name,
-        tolerance=tolerance,
-        errors=errors_of(answer, truth),
-        seconds=seconds,
-        compile_seconds=max(first - seconds, 0.0),
-        steps=np.nan if answer.steps is None else answer.steps,
-        events=np.nan if answer.times is None else len(answer.times),
-        status=result.status.code.name if isinstance(result, HybridArc) else "SUCCESS",
-    )
+# An error that cannot be told from zero.
+BELOW = "below the reference's"
 
 
 def _error(value: float, floor: float) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import attrs
 import numpy as np
 
-from hybrid.orbits.continuation.passing import CLOSED
+from hybrid.orbits.continuation.equations import CLOSED
 from hybrid.orbits.lap import Fired, Lap
 from hybrid.orbits.newton import Point, Shot
 from hybrid.orbits.orbit import PeriodicOrbit, first_start

@@ -10,18 +10,19 @@ from types import ModuleType
 from typing import Any
 
 from hybrid import arguments
+from hybrid.orbits.continuation.bifurcation_curve import BifurcationCurve
 from hybrid.orbits.continuation.branch import Branch
-from hybrid.orbits.continuation.continue_bifurcation import BifurcationCurve
 from hybrid.orbits.diagrams.diagram import Diagram
+from hybrid.orbits.equilibria.bifurcation_curve import EquilibriumCurve
 from hybrid.orbits.equilibria.branch import EquilibriumBranch
-from hybrid.orbits.equilibria.curves import EquilibriumCurve
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.sections import Section
 from hybrid.plot.arcs import plot_arc, plot_phase
 from hybrid.plot.basins import plot_basins, plot_fractions
-from hybrid.plot.branches import plot_branch, plot_curve, plot_diagram
+from hybrid.plot.branches import plot_branch, plot_curve
 from hybrid.plot.contacts import plot_contacts
 from hybrid.plot.datasets import plot_ends, plot_sweep
+from hybrid.plot.diagrams import plot_diagram
 from hybrid.plot.graph import plot_graph
 from hybrid.plot.jumps import plot_global_error, plot_jumps
 from hybrid.plot.orbits import plot_orbit, plot_section

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, Unpack
@@ -11,11 +10,11 @@ import numpy as np
 
 from hybrid import arguments
 from hybrid.errors import ArgumentError
+from hybrid.orbits.continuation.bifurcation_curve import BifurcationCurve
 from hybrid.orbits.continuation.branch import Branch
-from hybrid.orbits.continuation.continue_bifurcation import BifurcationCurve
-from hybrid.orbits.diagrams.diagram import Diagram
+from hybrid.orbits.equilibria.bifurcation_curve import EquilibriumCurve
 from hybrid.orbits.equilibria.branch import EquilibriumBranch
-from hybrid.orbits.equilibria.curves import EquilibriumCurve
+from hybrid.orbits.kinds import KINDS
 from hybrid.orbits.labelled import table_at
 from hybrid.plot.axes import (
     axes_for,
@@ -27,7 +26,6 @@ from hybrid.plot.labels import is_text, label_of
 from hybrid.plot.legends import small_legend
 from hybrid.plot.picture import Look, picture
 from hybrid.plot.styles import colour_of, dot_size, line_width
-from hybrid.simulation.quantities import mode_indices, table_of
 
 if TYPE_CHECKING:
     import xarray
@@ -35,22 +33,7 @@ if TYPE_CHECKING:
 
 AnyBranch = Branch | EquilibriumBranch
 
-# Markers by kind of bifurcation, and those of zeros of functions that callers name.
-MARKERS = {
-    "fold": "o",
-    "flip": "s",
-    "torus": "D",
-    "branch point": "P",
-    "grazing": "v",
-    "corner": "<",
-    "border": ">",
-    "crossing-sliding": "^",
-    "grazing-sliding": "p",
-    "switching-sliding": "h",
-    "adding-sliding": "d",
-    "Hopf": "*",
-    "boundary": "8",
-}
+# Markers of zeros of functions that callers name.
 OTHERS = ("X", "H", "1", "2", "3", "4")
 LINES = {"stable": "-", "unstable": "--"}
 # Line width in points, the smallest area of a dot that is seen beside such a line, and the colour of what
@@ -116,7 +99,7 @@ def plot_branch(
     """
     branches = _branches_of(branch)
     labels = _labels_of(label, branches)
-    names = [_quantity_of(each, y) for each in branches]
+    names = [quantity_of(each, y) for each in branches]
     cloud = None
     if over is not None:
         if hasattr(over, "data_vars"):
@@ -128,16 +111,16 @@ def plot_branch(
             raise arguments.refusal("over", wanted, over)
     (ax,) = axes_for(look, 1, (6.4, 4.2))
     if cloud is not None:
-        _draw_points(ax, *cloud)
+        draw_points(ax, *cloud)
     for each, name, text in zip(branches, names, labels, strict=True):
         _draw_branch(ax, each, name, text)
     ax.set_xlabel(label_of(branches[0].name, branches[0].system.units.get(branches[0].name)))
-    ax.set_ylabel(_label_of(branches[0], names[0]))
+    ax.set_ylabel(label_with_unit(branches[0], names[0]))
     _legend(ax)
     return ax
 
 
-def _label_of(branch: AnyBranch, name: str) -> str:
+def label_with_unit(branch: AnyBranch, name: str) -> str:
     """The name of what is drawn, with its unit."""
     if isinstance(branch, Branch) and name in branch.outputs:
         return label_of(name, branch.output_units.get(name))
@@ -175,7 +158,7 @@ def _labels_of(given: object, branches: Sequence[AnyBranch]) -> list[str | None]
     return found
 
 
-def _quantity_of(branch: AnyBranch, y: object) -> str:
+def quantity_of(branch: AnyBranch, y: object) -> str:
     """The name of what a branch is asked for."""
     if isinstance(branch, Branch) and arguments.whole_number(y) is None:
         return branch._asked("y: ", y)
@@ -244,85 +227,6 @@ def _with_bifurcations(branch: AnyBranch, name: str) -> tuple[np.ndarray, np.nda
 
 
 @picture
-def plot_diagram(
-    diagram: Diagram, y: str | int = 0, *, over: xarray.Dataset | Axes | None = None, **look: Unpack[Look]
-) -> Axes:
-    """Draw all branches of a diagram into one picture, each in a colour of its own; as :func:`plot_branch`.
-
-    Below them are dots for what the sweep of the diagram has reached, if it has one: of a component or an
-    output the points of the attractors; of a function in ``outputs=`` its value once around each orbit, and
-    over single forcing periods of other motion.
-
-    Parameters
-    ----------
-    diagram
-        From :func:`hybrid.continue_all`.
-    y
-        Name or index of a component, name of an output, or name of a function in ``outputs=`` of
-        :func:`hybrid.continue_all`. Where that is a maximum, a minimum or a mean of ``hybrid.measures``, an
-        equilibrium is drawn at the value itself; at other functions only orbits are drawn.
-    over
-        As for :func:`plot_branch`.
-
-    Returns
-    -------
-    matplotlib.axes.Axes
-
-    Examples
-    --------
-    >>> import hybrid, models
-    >>> from hybrid.measures import maximum
-    >>> from hybrid.plot import plot_diagram
-    >>> rest = hybrid.equilibrium(models.relief_valve(), (2.5, 0.0, 12.5))
-    >>> diagram = hybrid.continue_all(rest, "q", (7.0, 10.0), outputs={"top": maximum("y")})
-    >>> ax = plot_diagram(diagram, "top")
-    >>> ax.get_xlabel(), ax.get_ylabel()
-    ('q', 'top')
-    """
-    arguments.instance("diagram", diagram, Diagram, "Make one with hybrid.continue_all.")
-    shown: list[tuple[AnyBranch, Any]] = []
-    for each in diagram:
-        name: Any = y
-        if isinstance(each, EquilibriumBranch) and isinstance(y, str) and y in diagram.outputs:
-            measure = diagram.outputs[y]
-            if getattr(measure, "kind", None) not in ("maximum", "minimum", "mean"):
-                continue
-            name = measure.name
-        shown.append((each, name))
-    (ax,) = axes_for(look, 1, (6.4, 4.2))
-    if diagram.sweep is not None:
-        _draw_points(ax, "sweep", *_reached(diagram, y))
-    for i, (branch, name) in enumerate(shown):
-        plot_branch(branch, name, over=None if i else over, ax=ax)
-    for branch, _ in shown:
-        if isinstance(branch, Branch):
-            ax.set_ylabel(_label_of(branch, _quantity_of(branch, y)))
-    return ax
-
-
-def _reached(diagram: Diagram, y: str | int) -> tuple[np.ndarray, np.ndarray]:
-    """Parameter and values ``(N,)`` of what the sweep of a diagram has reached."""
-    sweep, system, name = diagram.sweep, diagram.system, diagram.name
-    assert sweep is not None
-    if isinstance(y, str) and y in diagram.outputs:
-        values = sweep["reached"].sel(measured=y).values
-        at = np.broadcast_to(sweep[name].values[:, None, None], values.shape)
-    else:
-        asked = named_quantity("y", system, y)
-        states = sweep["points"].sel(state=[*system.state_names]).values
-        there = np.isfinite(states).all(axis=-1)
-        at = np.broadcast_to(sweep[name].values[:, None, None], there.shape)[there]
-        known = system.parameter_values(json.loads(sweep.attrs["model_parameters"]))
-        table = np.tile(known, (len(at), 1))
-        table[:, [*system.parameters].index(name)] = at
-        modes = mode_indices(system, sweep["mode_of_point"].values[there])
-        times = np.full(len(at), float(sweep.attrs["t0"]))
-        values = table_of(system, [asked], times, states[there], modes, table)[:, 0]
-    good = np.isfinite(values)
-    return at[good], values[good]
-
-
-@picture
 def plot_curve(curve: BifurcationCurve | EquilibriumCurve, **look: Unpack[Look]) -> Axes:
     """Draw a curve of bifurcations in the plane of its two parameters, with its points of codimension two.
 
@@ -366,7 +270,7 @@ def _mark(ax: Axes, found: list[tuple[str, float, float]]) -> None:
     """Signs for what has a kind and a place, named once for a legend."""
     for kind in dict.fromkeys(each[0] for each in found):
         at = np.array([each[1:] for each in found if each[0] == kind])
-        marker = MARKERS.get(kind) or _other_marker(ax, kind)
+        marker = KINDS[kind].marker if kind in KINDS else _other_marker(ax, kind)
         label = None if kind in _texts(ax) else kind
         ax.plot(
             *at.T,
@@ -408,7 +312,7 @@ def _texts(ax: Axes) -> list[str]:
     return ax.get_legend_handles_labels()[1]
 
 
-def _draw_points(ax: Axes, kind: str, across: np.ndarray, up: np.ndarray) -> None:
+def draw_points(ax: Axes, kind: str, across: np.ndarray, up: np.ndarray) -> None:
     """Dots below the branches, wide enough to be seen beside a line through them."""
     area = max(dot_area(across, up), SEEN)
     ax.scatter(across, up, s=area, color="0.55", linewidths=0, rasterized=True, zorder=0, label=kind)

@@ -20,11 +20,11 @@ from hybrid.status import (
     beyond_status,
     chatter_status,
     discontinuous_status,
-    full_status,
     late_status,
     run_status,
     steep_status,
     stuck_status,
+    told,
 )
 from hybrid.system.clocks import fault_of, numbers_of
 from hybrid.system.growth import Unexplored
@@ -133,12 +133,7 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     ambiguous = 0 if trajectory.system.listed_order else run.order_mattered
     grazed = run.ill_conditioned if trajectory.tangents else 0
     if trajectory.tangents and singular:
-        return Status(
-            StatusCode.SINGULAR_SALTATION,
-            f"{singular} of {trajectory.jumps} jumps had no saltation matrix: they grazed exactly, or were "
-            "the limit of several transitions that accumulate in turn.",
-            "The tangent vectors are not valid after these jumps. Move the parameters away from the grazing.",
-        )
+        return told(StatusCode.SINGULAR_SALTATION, count=singular, jumps=trajectory.jumps)
     steep = _steep(trajectory, code)
     if steep is not None:
         return steep
@@ -149,12 +144,7 @@ def _status(trajectory: Trajectory, code: int) -> Status:
         within = f"within {run.field_jumps} steps, or is steeper there than the steps resolve"
         return discontinuous_status({trajectory.system.mode_names[run.jumped_in]: within})
     if trajectory.tangents and code == codes.DONE and run.indistinct:
-        return Status(
-            StatusCode.INDISTINCT_TANGENTS,
-            f"{run.indistinct} times the tangent vectors became parallel to rounding; the exponents after "
-            "the first are not known.",
-            "Shorten the steps by max_step= of the solver, or ask for fewer exponents.",
-        )
+        return told(StatusCode.INDISTINCT_TANGENTS, count=run.indistinct)
     if code == codes.DONE and run.unknown_time:
         return Status(StatusCode.INFINITE_SLOPE, f"Reached the end. {uncertain(trajectory)}", LOWER)
     if code == codes.DONE and run.lateness > MOST_LATENESS:
@@ -162,13 +152,8 @@ def _status(trajectory: Trajectory, code: int) -> Status:
     if code == codes.DONE and ambiguous:
         jumps = trajectory.jumps
         also = f" Besides, {grazed} of {jumps} jumps grazed within the tolerances." if grazed else ""
-        return Status(
-            StatusCode.AMBIGUOUS_ORDER,
-            f"{ambiguous} times two guards were reached together and the order of their transitions "
-            f"mattered; the one listed first was fired first.{also}",
-            "Choose the order in which the transitions are listed and declare "
-            "HybridSystem(listed_order=True), or add one for the corner.",
-        )
+        status = told(StatusCode.AMBIGUOUS_ORDER, count=ambiguous)
+        return attrs.evolve(status, message=status.message + also)
     together = _impacts_in_doubt(trajectory) if code == codes.DONE else None
     if together is not None:
         return together
@@ -188,10 +173,10 @@ def _status(trajectory: Trajectory, code: int) -> Status:
         derived = all(_is_derived(trajectory, i) for i in fired)
         return chatter_status(where, [names[i] for i in fired], derived=derived)
     if code == codes.TERMINAL and trajectory.system.growth is not None:
-        told = trajectory.system.growth.told.get(names[run.last_fired])
-        if told is not None:
+        why = trajectory.system.growth.told.get(names[run.last_fired])
+        if why is not None:
             return Status(
-                StatusCode.TERMINAL, f"Ended by {names[run.last_fired]!r} {where}. {told}", NO_WAY_ON
+                StatusCode.TERMINAL, f"Ended by {names[run.last_fired]!r} {where}. {why}", NO_WAY_ON
             )
     full = _full(trajectory) if code == codes.NON_FINITE else None
     if full is not None:
@@ -272,7 +257,13 @@ def _full(trajectory: Trajectory) -> Status | None:
         if clock is not None and clock.number == codes.UNDER_WAY:
             *places, last = numbers_of(clock, view, p)
             if float(last) == math.inf:
-                return full_status(_place(trajectory), transition.name, len(places), clock.told)
+                return told(
+                    StatusCode.DELAY_FULL,
+                    where=_place(trajectory),
+                    name=transition.name,
+                    places=len(places),
+                    told=clock.told,
+                )
     return None
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from hybrid import arguments
 from hybrid.errors import ModelError, unknown_name
 from hybrid.system.checks import authored, check_angles, check_cyclic, check_functions
+from hybrid.system.declared import as_counters, as_cyclic, as_held, as_parameters, as_state
 from hybrid.system.delayed import check_under_way, has_delays, written_out
 from hybrid.system.described import described, described_in_html
 from hybrid.system.elements import END, Mode, Transition
@@ -40,7 +41,7 @@ from hybrid.system.periodicity import Period, period_at
 from hybrid.system.portable import Portable
 from hybrid.system.repeat import Repeat
 from hybrid.system.switching import switching_inside
-from hybrid.system.variables import Variables, as_counters, as_cyclic, as_held, as_parameters, as_state
+from hybrid.system.variables import Variables
 from hybrid.system.watched import Watched
 
 if TYPE_CHECKING:
@@ -450,6 +451,8 @@ def laws_of(system: HybridSystem, given: Laws | None = None) -> Laws:
     ArgumentError, ModelError
         If a law does not fit the system, or names an output that the system does not have.
     """
+    if given is not None:
+        arguments.instance("laws", given, Laws, "Write Laws(conserved=...), or leave it out.")
     laws = system.laws if given is None else system.laws.joined(given)
     names = _written(system, "modes"), _written(system, "transitions")
     return placed(laws, system.variables, system.outputs, *names)

@@ -6,7 +6,7 @@ own tests with ``@given(cases(system))``.
 
 import sys
 
-from hybrid.testing.case import Case, Run
+from hybrid.testing.case import Case
 from hybrid.testing.check import check_system
 from hybrid.testing.contacts import (
     check_coefficients,
@@ -17,6 +17,7 @@ from hybrid.testing.contacts import (
 from hybrid.testing.crossings import check_crossings
 from hybrid.testing.derivatives import check_derivatives
 from hybrid.testing.dimensions import check_dimensions
+from hybrid.testing.elastic import check_elastic
 from hybrid.testing.ends import check_ends, check_sides_after
 from hybrid.testing.engine import Engine
 from hybrid.testing.errors import (
@@ -30,7 +31,6 @@ from hybrid.testing.fields import PiecewiseAffineField, piecewise_affine_fields
 from hybrid.testing.functions import check_angles, check_compiled, check_period
 from hybrid.testing.invariance import (
     check_cut,
-    check_elastic,
     check_names,
     check_order,
     check_samples,
@@ -42,6 +42,7 @@ from hybrid.testing.laws import check_laws
 from hybrid.testing.outputs import check_outputs
 from hybrid.testing.reads import check_reads
 from hybrid.testing.report import PropertyReport, SystemReport
+from hybrid.testing.run import Run
 from hybrid.testing.saltation import (
     check_continuity,
     check_extension,

@@ -15,7 +15,8 @@ from hybrid.system.elements import Function, Guard, Transition
 from hybrid.system.functions import condition_function, field_function, reset_function
 from hybrid.system.graph import HybridSystem
 from hybrid.system.members import full_name, groups_in, member_name
-from hybrid.testing.case import Case, lasting
+from hybrid.testing.case import Case
+from hybrid.testing.run import lasting
 from hybrid.testing.sizes import sizes_of_terms
 
 # Values may differ by this share of the sizes of their terms: sums of members are added in another order.

@@ -24,18 +24,13 @@ from hybrid.system.variables import named_values
 from hybrid.testing.engine import LIBRARY, Engine
 from hybrid.testing.errors import PropertyError, discard
 from hybrid.testing.reads import is_passed
+from hybrid.testing.run import LOOSER, MOST_JUMPS, Run, before_trouble, is_clean, mode_after
 from hybrid.testing.sizes import sizes_along
 from hybrid.transform.contacts.growth import contacts_of
 
 TIGHT = DOP853(rtol=1e-12, atol=1e-14, max_steps=20_000)
-# The run is repeated with tolerances looser by this factor, to estimate the error at its end.
-LOOSER = 100.0
-# A run is cut short after this many jumps: more jumps test nothing new.
-MOST_JUMPS = 5
 # The whole run, which is only looked at, ends after this many: more than tell that jumps repeat endlessly.
 MOST_OF_WHOLE = 2000
-# What a jump is that is not judged.
-KINDS = {"grazing": "so shallow that the tolerances decide it", "limit": "the limit of a chatter"}
 # A run is discarded if looser tolerances move its end by more than this, relative to its size.
 SENSITIVE = 1e-6
 
@@ -43,45 +38,6 @@ SENSITIVE = 1e-6
 def as_case(case: object) -> Case:
     """Return a case, or raise an ArgumentError."""
     return arguments.instance("case", case, Case, "Draw one with hybrid.testing.cases.")
-
-
-@attrs.frozen(eq=False)
-class Run:
-    """A run that properties can be judged on.
-
-    Attributes
-    ----------
-    arc
-        The run; all its jumps are transverse.
-    t1
-        End of the run, before any chatter, grazing or status that would end it.
-    error
-        Change of the end state with looser tolerances, ``(n,)``.
-    scale
-        Sizes of the components along the run, ``(n,)``, each in its own unit.
-    cut
-        Why the run ends before that of the case does; empty if it does not.
-
-    Examples
-    --------
-    >>> import models
-    >>> from hybrid.testing import Case
-    >>> ball = models.bouncing_ball()
-    >>> run = Case(ball, ball.parameters, "flight", (1.0, 0.0), 0.0, 0.6).run
-    >>> len(run.arc.jumps), run.cut
-    (1, '')
-    """
-
-    arc: HybridArc
-    t1: float
-    error: np.ndarray
-    scale: np.ndarray
-    cut: str = ""
-
-    @property
-    def tolerance(self) -> np.ndarray:
-        """Largest allowed difference between the ends of two runs that should agree, ``(n,)``."""
-        return 1e-9 * self.scale + LOOSER * self.error
 
 
 @attrs.frozen(eq=False, repr=False)
@@ -344,7 +300,7 @@ class Case:
             return "a run cannot start there"
         t1 = self.t1
         if not is_clean(arc) or len(arc.jumps) > MOST_JUMPS:
-            t1, cut = _before_trouble(arc)
+            t1, cut = before_trouble(arc)
             arc = self.simulate(t1)
         if not is_clean(arc):
             return f"the run failed: {arc.status}" if not arc.status.ok else "the run grazes or chatters"
@@ -391,47 +347,6 @@ class Case:
         )
 
 
-def is_clean(arc: HybridArc) -> bool:
-    """Whether a run reached its end with transverse jumps only."""
-    return arc.status.ok and not arc.grazings and not np.any(arc.jumps.kind != "transverse")
-
-
-def lasting(arc: HybridArc) -> np.ndarray:
-    """Which rows of a run hold states in which it stays for some time.
-
-    A jump may land where the next fires at once. Before the limit of a chatter the state is that of the last
-    jump that was followed.
-    """
-    first = np.searchsorted(arc.j, arc.j, side="left")
-    last = np.searchsorted(arc.j, arc.j, side="right") - 1
-    lasts = (arc.t[last] > arc.t[first]) | (len(arc.jumps) == 0)
-    limits = np.flatnonzero(arc.jumps.kind == "limit")
-    lasts &= ~(np.isin(arc.j, limits) & (np.arange(len(arc.t)) == last))
-    return np.asarray(lasts)
-
-
-def _before_trouble(arc: HybridArc) -> tuple[float, str]:
-    """A time before the first grazing, chatter or failure, between two jumps, and which of them it is."""
-    kinds = arc.jumps.kind
-    bad = np.flatnonzero(kinds != "transverse")
-    touched = min((grazing.t for grazing in arc.grazings), default=np.inf)
-    first = int(bad[0]) if len(bad) else len(kinds)
-    if len(bad) and arc.jumps.t[first] <= touched:
-        end, why = float(arc.jumps.t[first]), f"{arc.jumps.transition[first]!s} is {KINDS[str(kinds[first])]}"
-    elif arc.grazings:
-        end, why = touched, "a guard is grazed"
-    else:
-        end, why = float(arc.t[-1]), f"the run ends with {arc.status.code.name}"
-    jumps = arc.jumps.t[:first]
-    jumps = jumps[jumps < end]
-    if len(jumps) > MOST_JUMPS:
-        jumps, why = jumps[:MOST_JUMPS], f"it has more than {MOST_JUMPS} jumps"
-    times = np.unique([arc.t[0], *jumps])
-    if len(times) < 2:
-        return float(0.5 * (times[0] + end)), why
-    return float(0.5 * (times[-2] + times[-1])), why
-
-
 def lies_beyond(case: Case) -> str:
     """In words: the guards that forbid the start of a case."""
     told = [f"the gap of contact {name!r}" for name in negative_gaps(case)]
@@ -463,31 +378,6 @@ def guard_beyond(case: Case, transition: Transition, t: float, x: Any) -> float:
         case.system.variables, transition.guard.function, t, np.asarray(x, dtype=float), case.values
     )
     return np.nan if values is None else float(transition.guard.direction * values[0])
-
-
-def matrix_told(matrix: np.ndarray) -> str:
-    """A matrix or vector on one line."""
-    return np.array2string(
-        np.asarray(matrix),
-        separator=", ",
-        formatter={"float_kind": lambda v: f"{v:.8g}"},
-        max_line_width=10**6,
-    ).replace("\n", "")
-
-
-def jump_told(case: Case, jump: Jump) -> str:
-    """A jump in words."""
-    return (
-        f"event {jump.transition!r} at t = {jump.t:.10g} from mode {jump.source!r} to {jump.target!r}: "
-        f"{case.state_told(jump.x_minus)} becomes {case.state_told(jump.x_plus)}; guard's speed "
-        f"{jump.transversality:.6g}"
-    )
-
-
-def mode_after(jump: Jump) -> str:
-    """The mode that a jump leads to; a judged run contains no jump that ends the run."""
-    assert jump.target is not None
-    return jump.target
 
 
 def stretches(case: Case) -> Iterator[tuple[int, str | None, float, float]]:

@@ -11,8 +11,10 @@ import numpy as np
 from hybrid.expression.evaluation import Program
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.jumps import Jump
-from hybrid.testing.case import Case, as_case, jump_told, lasting
+from hybrid.testing.case import Case, as_case
 from hybrid.testing.errors import discard
+from hybrid.testing.run import lasting
+from hybrid.testing.words import jump_told
 from hybrid.transform.contacts.decide import POISSON
 from hybrid.transform.contacts.growth import SETTLING, ContactGrowth, contacts_of
 from hybrid.transform.contacts.statuses import OPEN

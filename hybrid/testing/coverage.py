@@ -18,9 +18,10 @@ from hybrid.system.elements import Function, Guard, Mode, Transition
 from hybrid.system.functions import field_function
 from hybrid.system.graph import HybridSystem
 from hybrid.system.watched import is_of_library
-from hybrid.testing.case import MOST_OF_WHOLE, Case, lasting
+from hybrid.testing.case import MOST_OF_WHOLE, Case
 from hybrid.testing.contacts import GAPS, gains_on
 from hybrid.testing.errors import PropertyError
+from hybrid.testing.run import lasting
 from hybrid.testing.starts import nearest_zero, start_in
 from hybrid.testing.symmetry import is_mirrored
 from hybrid.transform.contacts.growth import contacts_of

@@ -9,8 +9,9 @@ import numpy as np
 
 from hybrid.simulation.jumps import Jump
 from hybrid.status import StatusCode
-from hybrid.testing.case import Case, as_case, guard_beyond, jump_told
+from hybrid.testing.case import Case, as_case, guard_beyond
 from hybrid.testing.errors import discard
+from hybrid.testing.words import jump_told
 
 ENDS = "A run reaches its end, or a transition or a limit ends it"
 SIDES_AFTER = "A jump leaves the state on the near side of every guard, or another fires at once"
@@ -55,7 +56,10 @@ def check_ends(case: Case) -> None:
     if arc.status.code == StatusCode.STUCK and np.abs(arc.x[-1]).max() > GROWN * np.abs(arc.x[0]).max():
         discard("jumps follow one another within the rounding of time, since the state grows without bound")
     before = f"the last jump: {jump_told(case, arc.jumps[-1])}" if len(arc.jumps) else "before any jump"
-    hint = f"{BROKEN[arc.status.code]} Or a start that no run has: invariant= and equal= say where runs are."
+    hint = (
+        f"{BROKEN[arc.status.code]} Or a start that no run has: Laws(invariant=..., equal=...) say where "
+        "runs are."
+    )
     case.fail(ENDS, f"got {arc.status.message}", before, hint=hint, time=float(arc.t[-1]))
 
 

@@ -6,8 +6,10 @@ import numpy as np
 
 from hybrid.simulation.jumps import Jump
 from hybrid.system.functions import guard_function
-from hybrid.testing.case import Case, as_case, guard_beyond, jump_told, lasting, mode_after
+from hybrid.testing.case import Case, as_case, guard_beyond
 from hybrid.testing.errors import discard
+from hybrid.testing.run import lasting, mode_after
+from hybrid.testing.words import jump_told
 
 JUMPS = "Events happen where their guard crosses zero in its direction, and do what their reset says"
 SIDES = "A mode ends where its guards say"

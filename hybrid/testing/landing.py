@@ -7,8 +7,9 @@ import numpy as np
 from hybrid.errors import ModelError
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.jumps import Jump
-from hybrid.testing.case import Case, as_case, jump_told
+from hybrid.testing.case import Case, as_case
 from hybrid.testing.errors import discard
+from hybrid.testing.words import jump_told
 
 LANDINGS = "A reset gives the same a few units in the last place to either side of where its event lies"
 LIMITS = "The limit of a chatter goes on as a run that starts there does"

@@ -18,9 +18,11 @@ from hybrid.system.laws import Law, Laws
 from hybrid.system.outputs import function_in
 from hybrid.system.rows import fires, plain_firing
 from hybrid.testing.alike import check_alike
-from hybrid.testing.case import Case, as_case, jump_told, lasting, matrix_told
+from hybrid.testing.case import Case, as_case
 from hybrid.testing.errors import PropertyError, discard
+from hybrid.testing.run import lasting
 from hybrid.testing.sizes import sizes_of_terms
+from hybrid.testing.words import jump_told, matrix_told
 
 # A value may differ by this share of the sizes of its terms.
 TOLERANCE = 1e-8

@@ -6,12 +6,14 @@ import numpy as np
 
 from hybrid.compiler.compiled import compile_system
 from hybrid.errors import ArgumentError
-from hybrid.simulation.holding import tangent_projection
 from hybrid.simulation.jumps import Jump
 from hybrid.system.functions import field_function, guard_function, reset_function
-from hybrid.testing.case import Case, as_case, jump_told, matrix_told, mode_after
+from hybrid.testing.case import Case, as_case
 from hybrid.testing.errors import discard
+from hybrid.testing.run import mode_after
 from hybrid.testing.variants import altered
+from hybrid.testing.window import Window, guard_slope
+from hybrid.testing.words import jump_told, matrix_told
 
 SALTATION = "The saltation matrix is the derivative of the flow across the event"
 EXTENSION = "The saltation matrix does not depend on how the reset goes on off the guard"
@@ -19,8 +21,6 @@ CONTINUITY = "The saltation matrix is the identity where field and state are con
 FLOW_DIRECTION = "The saltation matrix takes the field before the event to the field after it"
 SUM_RULE = "The exponents sum to the divergence of the fields and the determinants of the jumps"
 
-# Displacements of the finite differences, relative to the size of the state.
-STEP = 1e-4
 # A share of the terms of a field by which rounding may change its values.
 ROUNDING = 1e-14
 GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)
@@ -47,7 +47,7 @@ def check_saltation(case: Case) -> None:
     """
     as_case(case)
     jump = case.the_jump()
-    window = _Window(case, jump)
+    window = Window(case, jump)
     differences, tolerance = window.differences()
     hint = (
         "a saltation matrix without its rank-one term, with a wrong sign or without a time term; or a wrong "
@@ -108,7 +108,7 @@ def check_extension(case: Case) -> None:
     variant = altered(case.system)
     if variant.resets_stay:
         discard("a model function cannot be traced, so it cannot be changed")
-    slope = _guard_slope(case, jump)
+    slope = guard_slope(case, jump)
     k = case.system.tangent_dimension
     x_scale = case.run.scale[:k]
     size = np.sum(np.abs(slope) * x_scale)
@@ -161,7 +161,7 @@ def check_continuity(case: Case) -> None:
         if case.transition(jump).reset is not None or case.follows_at_once(jump):
             continue
         before, after = _fields(case, jump)
-        slope = np.abs(_guard_slope(case, jump))
+        slope = np.abs(guard_slope(case, jump))
         kick = np.abs(after - before)[:, None] * slope / abs(jump.transversality)
         if not np.all(np.abs(after - before) <= 1e-9 * _terms(case, jump)):
             continue
@@ -290,104 +290,12 @@ def _divergence(case: Case) -> tuple[float, float]:
     return float(total), float(size)
 
 
-class _Window:
-    """The time window around one jump, or several jumps at one instant, for differences of the flow."""
-
-    def __init__(self, case: Case, jump: Jump) -> None:
-        self.case, self.run = case, case.run
-        self.jumps = [other for other in self.run.arc.jumps if other.t == jump.t]
-        self.jump, self.last = self.jumps[0], self.jumps[-1]
-        self.scale = self.run.scale[: case.system.tangent_dimension]
-        times = np.array([case.t0, *self.run.arc.jumps.t, self.run.t1])
-        before, after = jump.t - times[self.jump.j], times[self.last.j + 2] - jump.t
-        if not min(before, after) > 1e-6 * case.duration:
-            discard("events follow one another too closely")
-        rates = [
-            np.abs(_field_slope(case, mode, jump.t, x))
-            for mode, x in ((self.jump.source, self.jump.x_minus), (mode_after(self.last), self.last.x_plus))
-        ]
-        scale = self.scale
-        fastest = max(float(np.max(np.sum(rate * scale / scale[:, None], axis=1))) for rate in rates)
-        longest = min(0.5 * before, 0.5 * after)
-        self.width = min(longest, 0.2 / fastest) if fastest > 0 else longest
-        self.begin, self.end = jump.t - self.width, jump.t + self.width
-        self.start = self.run.arc(self.begin)
-
-    def differences(self) -> tuple[np.ndarray, np.ndarray]:
-        """Derivative of the end state by the start state, and the tolerance of its scaled form."""
-        scale, jump = self.scale, self.jump
-        slope = np.abs(_guard_slope(self.case, jump))
-        # The displaced runs must also cross the guard inside the window.
-        shift = slope * scale / abs(jump.transversality)
-        step = min(STEP, 0.1 * self.width / float(shift.max())) if shift.any() else STEP
-        if step < 1e-7:
-            discard("the guard is crossed too slowly for finite differences")
-        coarse, fine = (self._central(h) for h in (step, 0.5 * step))
-        spread = np.abs(self.scaled(fine - coarse))
-        size = 1.0 + np.abs(self.scaled(fine)).max()
-        noise = 20.0 * (self.case.solver.rtol + 1e-13) / step
-        tolerance = 2.0 * spread + (noise + 1e-7) * size
-        if not tolerance.max() <= 1e-2 * size:
-            discard("the finite differences do not converge near a grazing")
-        return (4.0 * fine - coarse) / 3.0 @ self._within(), tolerance
-
-    def _within(self) -> np.ndarray:
-        """The directions in which a state may be displaced: what its mode holds stays zero."""
-        case, mode = self.case, self.case.mode_of(self.jump.source)
-        if mode.holds is None:
-            return np.eye(len(self.scale))
-        return tangent_projection(case.system, mode, self.begin, self.start, case.values)
-
-    def _central(self, step: float) -> np.ndarray:
-        columns = []
-        for i, h in enumerate(step * self.scale):
-            displacement = np.zeros_like(self.start)
-            displacement[i] = h
-            columns.append(
-                (self._flow(self.start + displacement) - self._flow(self.start - displacement)) / (2 * h)
-            )
-        return np.column_stack(columns)
-
-    def _flow(self, x: np.ndarray) -> np.ndarray:
-        arc = self.case.simulate(self.end, start=(self.begin, x, self.jump.source))
-        if not arc.status.ok or [jump.transition for jump in arc.jumps] != [
-            jump.transition for jump in self.jumps
-        ]:
-            discard("a displaced run has other events")
-        return np.asarray(arc.x[-1, : len(self.scale)])
-
-    def fundamental(self) -> np.ndarray:
-        """Tangent map of a run across the event."""
-        arc = self.case.simulate(self.end, start=(self.begin, self.start, self.jump.source), tangent=True)
-        assert arc.fundamental is not None
-        return arc.fundamental
-
-    def through(self, xi: np.ndarray) -> np.ndarray:
-        """The matrix ``xi`` between the tangent maps up to just before the jump and from just after it."""
-        case, jump, last = self.case, self.jump, self.last
-        gap = 1e-6 * self.width
-        before = case.simulate(jump.t - gap, start=(self.begin, self.start, jump.source), tangent=True)
-        after = case.simulate(self.end, start=(last.t, last.x_plus, mode_after(last)), tangent=True)
-        rest = np.eye(len(self.scale)) + gap * _field_slope(case, jump.source, jump.t, jump.x_minus)
-        assert before.fundamental is not None
-        assert after.fundamental is not None
-        return np.asarray(after.fundamental @ xi @ rest @ before.fundamental)
-
-    def product(self) -> np.ndarray:
-        """Product of the saltation matrices of all jumps at the instant."""
-        product = self.jump.saltation
-        for jump in self.jumps[1:]:
-            product = jump.saltation @ product
-        return product
-
-    def invertible(self) -> bool:
-        """Whether all matrices but the last can be inverted, so that the product must be the tangent map."""
-        conditions = [np.linalg.cond(self.scaled(jump.saltation)) for jump in self.jumps[:-1]]
-        return all(condition < 1e6 for condition in conditions)
-
-    def scaled(self, matrix: np.ndarray) -> np.ndarray:
-        """A map between states, in units of the sizes of the components."""
-        return np.asarray(matrix * self.scale / self.scale[:, None])
+def _fields(case: Case, jump: Jump) -> tuple[np.ndarray, np.ndarray]:
+    k = case.system.tangent_dimension
+    return (
+        case.evaluate(case.rates_of(jump.source), jump.t, jump.x_minus)[:k],
+        case.evaluate(case.rates_of(mode_after(jump)), jump.t, jump.x_plus)[:k],
+    )
 
 
 def _saltation(case: Case, jump: Jump) -> np.ndarray:
@@ -399,17 +307,6 @@ def _saltation(case: Case, jump: Jump) -> np.ndarray:
         discard(str(error))
 
 
-def _guard_slope(case: Case, jump: Jump) -> np.ndarray:
-    function = guard_function(case.transition(jump))
-    return case.slope(function, jump.transition, jump.t, jump.x_minus)[0, : case.system.tangent_dimension]
-
-
-def _field_slope(case: Case, mode: str, t: float, x: np.ndarray) -> np.ndarray:
-    function = field_function(case.mode_of(mode), case.system.variables)
-    k = case.system.tangent_dimension
-    return case.slope(function, mode, t, x)[:k, :k]
-
-
 def _terms(case: Case, jump: Jump) -> np.ndarray:
     """Sizes of the terms of both fields at a jump, ``(n,)``: a rate may be zero because they cancel."""
     sizes = np.zeros(case.system.dimension)
@@ -419,11 +316,3 @@ def _terms(case: Case, jump: Jump) -> np.ndarray:
         sizes += slope[:, :-1] @ case.run.scale + slope[:, -1] * case.duration
         sizes += np.abs(case.evaluate(case.rates_of(mode.name), jump.t, x))
     return sizes[: case.system.tangent_dimension]
-
-
-def _fields(case: Case, jump: Jump) -> tuple[np.ndarray, np.ndarray]:
-    k = case.system.tangent_dimension
-    return (
-        case.evaluate(case.rates_of(jump.source), jump.t, jump.x_minus)[:k],
-        case.evaluate(case.rates_of(mode_after(jump)), jump.t, jump.x_plus)[:k],
-    )

@@ -159,7 +159,7 @@ def cases(
     passable: Iterable[str] = (),
     solver: Solver = TIGHT,
     engine: Engine = LIBRARY,
-    **options: Any,
+    laws: Laws | None = None,
 ) -> SearchStrategy[Case]:
     """Runs of a system for the properties, each starting in a mode whose guards allow the start.
 
@@ -182,10 +182,8 @@ def cases(
         Method and tolerances, which should be tight: a run that depends on them cannot be judged.
     engine
         Computes runs and derivatives.
-    **options
-        Laws beside those that the system carries, by the names of :class:`hybrid.Laws`: ``invariant``,
-        ``equal``, ``conserved``, ``dissipated``, ``balance``, ``continuous``, ``across``, ``elastic`` and
-        ``alike``.
+    laws
+        What the author knows, beside the laws that the system carries.
 
     Raises
     ------
@@ -210,7 +208,7 @@ def cases(
         for name in arguments.items("passable", passable, "be names of transitions")
     )
     begin, end = _time_span(t_span) if t_span is not None else (0.0, None)
-    known = all_laws(system, options)
+    known = laws_of(system, laws)
     solver = check_solver(solver)
     arguments.instance("engine", engine, Engine, "Subclass hybrid.testing.Engine.")
 
@@ -253,21 +251,6 @@ def _touches(count: int) -> list[tuple[int, ...]]:
     """The contacts that are closed at a start: none, each alone, all."""
     alone = [(i,) for i in range(count)]
     return [(), *alone, *([tuple(range(count))] if count > 1 else [])]
-
-
-def all_laws(system: HybridSystem, given: Mapping[str, Any]) -> Laws:
-    """The laws that a system carries, and those given by name to a check.
-
-    Raises
-    ------
-    ArgumentError
-        If there is no such kind of law, or a law does not fit the system.
-    """
-    kinds = [field.name for field in attrs.fields(Laws)]
-    for name in given:
-        arguments.known("Argument", name, kinds, "Laws")
-    laws = Laws(**{name: value for name, value in given.items() if value is not None})
-    return laws_of(system, laws)
 
 
 def default_duration(system: HybridSystem, values: Mapping[str, float]) -> float:

@@ -16,9 +16,10 @@ from hybrid.system.elements import Transition
 from hybrid.system.entries import enters_anew, enters_itself
 from hybrid.system.places import UnderWay
 from hybrid.system.schedule import At
-from hybrid.testing.case import Case, as_case, jump_told
+from hybrid.testing.case import Case, as_case
 from hybrid.testing.errors import discard
 from hybrid.testing.waits import TICKS, check_waits
+from hybrid.testing.words import jump_told
 
 # Ticks are known up to the rounding of a few operations with times.
 ROUNDING = 64.0 * float(np.finfo(float).eps)

@@ -11,7 +11,8 @@ import numpy as np
 
 from hybrid.compiler.compiled import compile_system
 from hybrid.solvers import Solver
-from hybrid.system.clocks import Clock, DerivedClock, numbers_of
+from hybrid.system.clocks import Clock, numbers_of
+from hybrid.system.derived_clock import DerivedClock
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem

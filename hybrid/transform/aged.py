@@ -14,7 +14,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from hybrid.system.clocks import Clock, DerivedClock, numbers_of
+from hybrid.system.clocks import Clock, numbers_of
+from hybrid.system.derived_clock import DerivedClock
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.entries import begins_age, check_ages, has_age
 from hybrid.system.functions import WholeReset

@@ -17,7 +17,7 @@ from hybrid.expression.continuity import vanishes_on
 from hybrid.expression.derivatives import jacobian_of
 from hybrid.expression.evaluation import expressed, scalar
 from hybrid.expression.graph import all_replaced, nodes_of
-from hybrid.expression.nodes import HALF, ZERO, Expression, Power, add, power
+from hybrid.expression.nodes import ZERO, Expression, Power, add
 from hybrid.expression.polynomials import is_zero
 from hybrid.expression.surfaces import Surfaces
 from hybrid.expression.switches import Resolved, Switches
@@ -26,13 +26,10 @@ from hybrid.system.variables import Variables
 from hybrid.transform import additive
 from hybrid.transform.naming import Names
 from hybrid.transform.rounding import combined
+from hybrid.transform.shares import bilinear, stable_shares
 from hybrid.transform.surface import SwitchingSurface
 from hybrid.transform.ties import Sides, Ties
 from hybrid.transform.titles import Titles
-
-# Two solutions for the shares on an intersection count as one if their relative difference is less than the
-# square root of this number.
-FOLD = 1e-8
 
 
 @attrs.frozen
@@ -355,16 +352,14 @@ class Pieces:
     def _bilinear(self, sides: Sides, one: int, other: int) -> Shares:
         """The field on an intersection: each side has a share, and the shares of corners are products.
 
-        With the rates ``g = p0 + p1 a + p2 b + p3 a b`` and ``h = q0 + q1 a + q2 b + q3 a b`` of the two
-        heights, ``-1 <= a, b <= 1``, the stable one of the two solutions of ``g = h = 0`` is that where the
-        determinant of the derivatives in ``a`` and ``b`` is positive.
+        They are those at which both heights stand still, of two solutions the stable one.
         """
         symbols = self.surfaces.symbols
         corners = {
             (i, j): self._vertex_field(self.ties.moved(sides, {one: i, other: j}))
             for i, j in product((-2, 2), repeat=2)
         }
-        field = [_coefficients(*each) for each in zip(*corners.values(), strict=True)]
+        field = [bilinear(*each) for each in zip(*corners.values(), strict=True)]
         speeds = []
         for number in (one, other):
             # The rate of the height is linear in the field: its coefficients are the rates along theirs.
@@ -374,31 +369,6 @@ class Pieces:
                 for k in range(4)
             ]
             speeds.append([rates[0] + own, *rates[1:]])
-        (p0, p1, p2, p3), (q0, q1, q2, q3) = speeds
-        square, linear, constant = (
-            q2 * p3 - q3 * p2,
-            q0 * p3 + q2 * p1 - q1 * p2 - q3 * p0,
-            q0 * p1 - q1 * p0,
-        )
-        if is_zero(square):
-            b, unique = -constant / linear, linear
-        else:
-            root = power(linear**2 - 4 * square * constant, HALF)
-            # Both quotients of the quadratic formula, each weighted with its denominator: no sign of a
-            # coefficient makes terms cancel, and the square may vanish.
-            b = (2 * square * (root - linear) - 2 * constant * (root + linear)) / (
-                4 * square**2 + (root + linear) ** 2
-            )
-            unique = root**2 - FOLD * (linear**2 + square**2)
-        # Both rates give the same share; one of them may not depend on it.
-        p, q = p1 + p3 * b, q1 + q3 * b
-        a = -((p0 + p2 * b) * p + (q0 + q2 * b) * q) / (p**2 + q**2)
+        a, b, unique = stable_shares(*speeds)
         flow = expressed([c0 + c1 * a + c2 * b + c3 * (a * b) for c0, c1, c2, c3 in field])
         return Shares(flow, {one: a, other: b}, unique)
-
-
-def _coefficients(mm: Expression, mp: Expression, pm: Expression, pp: Expression) -> tuple[Expression, ...]:
-    """Coefficients of 1, a, b and ab of the bilinear function with these values where a, b are -1 or 1."""
-    signs = (-1, -1, 1, 1), (-1, 1, -1, 1), (1, -1, -1, 1)
-    by_a, by_b, by_both = (combined(*zip(each, (mm, mp, pm, pp), strict=True)) / 4 for each in signs)
-    return pp - by_a - by_b - by_both, by_a, by_b, by_both

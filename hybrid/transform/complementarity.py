@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
 from hybrid import arguments
 from hybrid.errors import ModelError
+from hybrid.shared import shares
+from hybrid.system.declared import as_parameters, as_state
 from hybrid.system.elements import Function, Mode
 from hybrid.system.graph import HybridSystem
-from hybrid.system.laws import Laws
 from hybrid.system.outputs import as_outputs
-from hybrid.system.periodicity import Period
-from hybrid.system.variables import Variables, as_parameters, as_state
+from hybrid.system.variables import Variables
 from hybrid.system.watched import Watched
+from hybrid.transform.asked import Described, passed_on
 from hybrid.transform.pairs.pair import Pair
 
 # All sets of pairs are tried.
 MOST_PAIRS = 10
 
 
+@shares(Described)
 def complementarity(
     *,
     state: tuple[str, ...] | int,
@@ -29,12 +31,7 @@ def complementarity(
     pairs: Iterable[Pair],
     parameters: Mapping[str, float] | None = None,
     modes: Mapping[str, Any] | None = None,
-    period: Period = None,
-    name: str = "",
-    units: Mapping[str, str] | None = None,
-    angles: Mapping[str, float] | None = None,
-    outputs: Mapping[str, Any] | None = None,
-    laws: Laws | None = None,
+    **asked: Unpack[Described],
 ) -> HybridSystem:
     """The hybrid system of equations with ideal diodes, or with other pairs of which one is zero.
 
@@ -45,7 +42,7 @@ def complementarity(
 
     Parameters
     ----------
-    state, parameters, period, name, units, angles, outputs, laws
+    state, parameters
         As for `HybridSystem`.
     rates
         ``f(t, x, z, p)``, the ``n`` derivatives. Unknowns are read by the names of pairs, as in ``z.diode``.
@@ -127,7 +124,8 @@ def complementarity(
     equations = Equations(variables, rates, found, modes)
     judge = Judge(equations)
     _check_degrees(judge)
-    own = as_outputs({} if outputs is None else outputs, "complementarity")
+    given_outputs = {} if asked["outputs"] is None else asked["outputs"]
+    own = as_outputs(given_outputs, "complementarity")
     told = {f"{each.name}.{what}": _free_of_pairs for each in found for what in ("w", "z")}
     taken = sorted(own.keys() & told.keys())
     if taken:
@@ -137,18 +135,12 @@ def complementarity(
         parameters=values,
         modes=[Mode("free", _without_pairs(equations))],
         transitions=[],
-        period=period,
-        name=name,
-        units={} if units is None else units,
-        angles={} if angles is None else angles,
-        outputs={**own, **as_outputs(told)},
-        laws=Laws() if laws is None else laws,
+        **{**passed_on(asked), "outputs": {**own, **as_outputs(told)}},
         derived_from=Watched([rates, *(each.w for each in found)]),
     )
     called = {
         **{"state": state, "rates": rates, "pairs": found, "parameters": parameters, "modes": modes},
-        **{"period": period, "name": name, "units": units, "angles": angles},
-        **{"outputs": outputs, "laws": laws},
+        **asked,
     }
     return PairGrowth(judge, original, Origin(complementarity, called)).current
 

@@ -36,7 +36,8 @@ from hybrid.expression.operations import (
 from hybrid.expression.pieces import Pieces, items
 from hybrid.expression.tabulated import Tabulated
 from hybrid.expression.tracing import TraceError, model_symbols, trace
-from hybrid.system.clocks import Clock, DerivedClock, numbers_of
+from hybrid.system.clocks import Clock, numbers_of
+from hybrid.system.derived_clock import DerivedClock
 from hybrid.system.elements import Guard, Reset, Transition
 from hybrid.system.functions import WholeReset
 from hybrid.system.graph import HybridSystem, watched_below

@@ -11,7 +11,8 @@ import numpy as np
 
 from hybrid.expression.reads import names_read
 from hybrid.expression.values import TraceError
-from hybrid.system.clocks import Clock, DerivedClock, numbers_of
+from hybrid.system.clocks import Clock, numbers_of
+from hybrid.system.derived_clock import DerivedClock
 from hybrid.system.elements import Guard, Mode, Reset, Transition
 from hybrid.system.functions import WholeField, WholeReset
 from hybrid.system.graph import HybridSystem, watched_below

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Mapping
+from typing import Unpack
 
 from hybrid.errors import ModelError, shown
+from hybrid.shared import shares
+from hybrid.system.declared import as_parameters, as_state
 from hybrid.system.elements import Function, Guard, Mode, Reset, Transition
 from hybrid.system.graph import HybridSystem
-from hybrid.system.laws import Laws
-from hybrid.system.variables import Variables, as_parameters, as_state
+from hybrid.system.variables import Variables
 from hybrid.system.watched import Watched
+from hybrid.transform.asked import DescribedWithShifts, passed_on
 from hybrid.transform.surface import SwitchingSurface
 
 
+@shares(DescribedWithShifts)
 def filippov(
     state: tuple[str, ...] | int,
     parameters: Mapping[str, float],
@@ -22,13 +25,7 @@ def filippov(
     switching: Function,
     *,
     start: str | None = None,
-    period: float | Function | None = None,
-    name: str = "",
-    units: Mapping[str, str] | None = None,
-    angles: Mapping[str, float] | None = None,
-    cyclic: Iterable[str] = (),
-    outputs: Mapping[str, Any] | None = None,
-    laws: Laws | None = None,
+    **asked: Unpack[DescribedWithShifts],
 ) -> HybridSystem:
     """The Filippov system ``f_b`` where ``h < 0``, ``f_a`` where ``h > 0``, with its sliding mode derived.
 
@@ -59,7 +56,7 @@ def filippov(
     switching
         Scalar function ``h(t, x, p)``, which must be traceable. Its gradient must not vanish where ``h = 0``.
         The sliding mode needs ``h`` to be twice differentiable.
-    start, period, name, units, angles, cyclic, outputs, laws
+    start
         As for `HybridSystem`.
 
     Returns
@@ -146,13 +143,7 @@ def filippov(
         modes=modes,
         transitions=transitions,
         start=start,
-        period=period,
-        name=name,
-        units={} if units is None else units,
-        angles={} if angles is None else angles,
-        cyclic=cyclic,
-        outputs={} if outputs is None else outputs,
-        laws=Laws() if laws is None else laws,
+        **passed_on(asked),
         derived_from=Watched([below, above, switching]),
     )
 

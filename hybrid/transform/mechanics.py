@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Unpack
 
 from hybrid import arguments
 from hybrid.errors import HybridError, ModelError
+from hybrid.shared import shares
 from hybrid.system.checks import check_cyclic
+from hybrid.system.declared import as_parameters, as_state
 from hybrid.system.elements import Function, Mode
 from hybrid.system.functions import ModelFunction
 from hybrid.system.graph import HybridSystem
-from hybrid.system.laws import Laws
 from hybrid.system.outputs import as_outputs
-from hybrid.system.variables import Variables, as_parameters, as_state
+from hybrid.system.variables import Variables
 from hybrid.system.watched import Watched
+from hybrid.transform.asked import DescribedWithShifts, passed_on
 from hybrid.transform.contacts.contact import Contact
 from hybrid.transform.contacts.statuses import FREE, statuses_of
 
@@ -22,6 +24,7 @@ from hybrid.transform.contacts.statuses import FREE, statuses_of
 NAMES = "be names that can be written as attributes, one or several"
 
 
+@shares(DescribedWithShifts)
 def mechanics(
     *,
     coordinates: Iterable[str],
@@ -34,14 +37,8 @@ def mechanics(
     parameters: Mapping[str, float] | None = None,
     impacts: str = "newton",
     together: float = 1e-9,
-    period: float | Function | None = None,
-    name: str = "",
     start: str | None = None,
-    units: Mapping[str, str] | None = None,
-    angles: Mapping[str, float] | None = None,
-    cyclic: Iterable[str] = (),
-    outputs: Mapping[str, Any] | None = None,
-    laws: Laws | None = None,
+    **asked: Unpack[DescribedWithShifts],
 ) -> HybridSystem:
     """The hybrid system of bodies with unilateral contacts and dry friction.
 
@@ -71,7 +68,9 @@ def mechanics(
         another, in listed order, where several close together.
     together
         Gaps below this count as closed when another contact closes: they take part in its impact.
-    period, name, start, units, angles, cyclic, outputs, laws
+    start
+        As for `HybridSystem`.
+    cyclic
         As for `HybridSystem`. Along a cyclic coordinate the accelerations without contacts, all gaps, slips
         and coefficients are the same.
 
@@ -158,7 +157,8 @@ def mechanics(
     functions = [mass, forces, kinetic, potential]
     for each in touching:
         functions += [each.gap, each.slip, each.restitution, each.friction, each.static]
-    own = as_outputs({} if outputs is None else outputs, "mechanics")
+    given_outputs = {} if asked["outputs"] is None else asked["outputs"]
+    own = as_outputs(given_outputs, "mechanics")
     taken = sorted(own.keys() & system.outputs.keys())
     if taken:
         raise ModelError(f"mechanics: outputs: {taken[0]!r} is told of a contact. Choose another name.")
@@ -167,21 +167,15 @@ def mechanics(
         parameters=values,
         modes=[Mode(FREE, free)],
         transitions=[],
-        period=period,
-        name=name,
-        units={} if units is None else units,
-        angles={} if angles is None else angles,
-        cyclic=cyclic,
-        outputs={**own, **system.outputs},
-        laws=Laws() if laws is None else laws,
+        **{**passed_on(asked), "outputs": {**own, **system.outputs}},
         derived_from=Watched([each for each in functions if callable(each)]),
     )
     check_cyclic(original.variables, _moved_by(free, touching), original.is_cyclic)
     called = {
         **{"coordinates": q, "velocities": u, "contacts": touching, "parameters": parameters},
         **{"mass": mass, "forces": forces, "kinetic": kinetic, "potential": potential},
-        **{"impacts": impacts, "together": together, "period": period, "name": name, "start": start},
-        **{"cyclic": cyclic, "units": units, "angles": angles, "outputs": outputs, "laws": laws},
+        **{"impacts": impacts, "together": together, "start": start},
+        **asked,
     }
     return ContactGrowth(judge, original, Origin(mechanics, called), start).current
 

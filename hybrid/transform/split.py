@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, Unpack
 
+from hybrid.shared import shares
 from hybrid.system.elements import Function, Mode
 from hybrid.system.graph import HybridSystem, as_system
-from hybrid.system.laws import Laws
-from hybrid.system.periodicity import Period
 from hybrid.system.repeat import Repeat
+from hybrid.transform.asked import DescribedWithShifts, passed_on
 
 
+@shares(DescribedWithShifts)
 def from_equations(
     field: Function,
     *,
     state: tuple[str, ...] | int,
     parameters: Mapping[str, float] | None = None,
-    period: Period = None,
-    name: str = "",
-    units: Mapping[str, str] | None = None,
-    angles: Mapping[str, float] | None = None,
-    cyclic: Iterable[str] = (),
-    outputs: Mapping[str, Any] | None = None,
-    laws: Laws | None = None,
     modes: Mapping[str, Any] | None = None,
     repeats: Iterable[Repeat] = (),
+    **asked: Unpack[DescribedWithShifts],
 ) -> HybridSystem:
     """The hybrid system of one right-hand side with ``np.sign``, ``np.abs``, ``np.where`` and the like.
 
@@ -35,7 +30,7 @@ def from_equations(
     ----------
     field
         ``f(t, x, p)``, which returns the ``n`` derivatives. It must be traceable.
-    state, parameters, period, name, units, angles, cyclic, outputs, laws
+    state, parameters
         As for `HybridSystem`.
     modes
         Names for the modes, as for `split`.
@@ -67,13 +62,7 @@ def from_equations(
             state=state,
             parameters={} if parameters is None else parameters,
             modes=[Mode("smooth", field)],
-            period=period,
-            name=name,
-            units={} if units is None else units,
-            angles={} if angles is None else angles,
-            cyclic=cyclic,
-            outputs={} if outputs is None else outputs,
-            laws=Laws() if laws is None else laws,
+            **passed_on(asked),
             repeats=repeats,
         ),
         modes=modes,

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.accuracy.averages import running_tapered_mean
 from hybrid.display.tables import table
+from hybrid.measures.averages import running_tapered_mean
 from lyapunov.floquet import floquet_exponents
 from lyapunov.study.column import PAPERS, PaperColumn, printed, running, steady
 from lyapunov.study.paper import DOUBTFUL, PAPER, ROWS

@@ -294,7 +294,7 @@ ODDITIES = {
     "date": np.datetime64("2020-01-01"),
 }
 # Each of its calls runs a system many times, so one argument and one example are enough.
-SLOW = {"check_system": ("elastic", {"examples": 1})}
+SLOW = {"check_system": ("laws", {"examples": 1})}
 
 
 @pytest.mark.parametrize("oddity", ODDITIES)

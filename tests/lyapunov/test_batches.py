@@ -5,9 +5,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybrid.accuracy.averages import MAX_BATCHES, standard_error, standard_error_from_batches
+from hybrid.measures.averages import MAX_BATCHES, standard_error, standard_error_from_batches
 from lyapunov.batches import EMPTY, closed_batch_means, push
-from tests.hybrid.accuracy.test_averages import autoregressive
+from tests.hybrid.measures.test_averages import autoregressive
 
 
 def accumulate(series, batches, add=push):

@@ -14,7 +14,7 @@ import lyapunov
 import models
 from hybrid import StatusCode
 from lyapunov.chart import Exponents
-from lyapunov.spectrum import Estimates
+from lyapunov.estimates import Estimates
 from models.one_impact import one_impact_orbits
 
 SHORT = {"intervals": 60, "transient": 20, "solver": hybrid.DOP853(rtol=1e-7, atol=1e-9)}

@@ -14,8 +14,9 @@ from hybrid.testing.contacts import COEFFICIENTS, FORCES, IMPACTS
 from hybrid.testing.coverage import IMPACTS_OF
 from hybrid.testing.crossings import CROSSINGS
 from hybrid.testing.dimensions import DIMENSIONS
+from hybrid.testing.elastic import ELASTIC
 from hybrid.testing.events import JUMPS, SIDES
-from hybrid.testing.invariance import CUT, ELASTIC
+from hybrid.testing.invariance import CUT
 from hybrid.testing.landing import LANDINGS, LIMITS
 from hybrid.testing.laws import law_checks
 from hybrid.testing.saltation import CONTINUITY, EXTENSION, FLOW_DIRECTION, SALTATION, SUM_RULE

@@ -12,10 +12,10 @@ import numpy as np
 from hybrid import arguments
 from hybrid.display.tables import counted
 from hybrid.orbits.continuation.change import Change
-from hybrid.orbits.continuation.event import KINDS, OfThisProcess
+from hybrid.orbits.continuation.event import OfThisProcess
 from hybrid.orbits.continuation.labelled import dataset_of
 from hybrid.orbits.continuation.place import Place
-from hybrid.orbits.kinds import comes_back, of_kinds
+from hybrid.orbits.kinds import OF_ORBITS, comes_back, of_kinds
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.simulation.quantities import Asked, mode_indices, quantity, table_of
 from hybrid.status import Status
@@ -181,7 +181,7 @@ class Branch(Asked):
         ArgumentError
             If there is no such kind.
         """
-        return of_kinds(self.bifurcations, kinds, (*KINDS, *self.events))
+        return of_kinds(self.bifurcations, kinds, (*OF_ORBITS, *self.events))
 
     @cached_property
     def orbits(self) -> tuple[PeriodicOrbit, ...]:

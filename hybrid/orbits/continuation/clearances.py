@@ -10,7 +10,8 @@ import attrs
 import numpy as np
 
 from hybrid.orbits.continuation.conditions import comparisons
-from hybrid.orbits.continuation.passing import CLOSED, Pass
+from hybrid.orbits.continuation.equations import CLOSED
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.system.derivatives import evaluate
 from hybrid.system.elements import Transition
 

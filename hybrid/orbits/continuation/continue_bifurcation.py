@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -11,32 +10,26 @@ import numpy as np
 from hybrid import arguments
 from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import Progress, progress_bar
-from hybrid.display.tables import counted
 from hybrid.errors import ArgumentError
 from hybrid.measures.asked import Unmeasured
+from hybrid.orbits.continuation.bifurcation_curve import BifurcationCurve, CodimensionTwo
 from hybrid.orbits.continuation.branch import Bifurcation
 from hybrid.orbits.continuation.clearances import curve_clearance_of
 from hybrid.orbits.continuation.curve import BESIDE, SMOOTH, Curve, Special, Spot, along_curve
-from hybrid.orbits.continuation.event import KINDS
 from hybrid.orbits.continuation.monitors import JUMPED
 from hybrid.orbits.continuation.place import Place, place_of, place_on
 from hybrid.orbits.continuation.result import Points, orbit_of, whole_orbit_of
 from hybrid.orbits.continuation.route import Loop
 from hybrid.orbits.continuation.watch import OfArc, Watch, checked_outputs, units_of
+from hybrid.orbits.equilibria.bifurcation_curve import EquilibriumCurve
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation
-from hybrid.orbits.equilibria.curves import EquilibriumCurve, curve_of
-from hybrid.orbits.orbit import PeriodicOrbit, unaged
+from hybrid.orbits.equilibria.curves import curve_of
+from hybrid.orbits.kinds import KINDS, OF_ORBITS
+from hybrid.orbits.orbit import unaged
 from hybrid.simulation.interrupt import interrupted_status
-from hybrid.simulation.labelled import Names, attributes
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import Solver, Taylor
 from hybrid.status import SUCCESS, Status, StatusCode
-from hybrid.system.graph import HybridSystem
-
-if TYPE_CHECKING:
-    import xarray
-
-PLURALS = {"torus": "tori"}
 
 ENDS = {
     "range": "the end of a range",
@@ -48,141 +41,6 @@ ENDS = {
     "lost": "a place beyond which Newton's method finds no point",
     "unmeasured": "an orbit that a function fails on",
 }
-
-
-@attrs.frozen(eq=False)
-class CodimensionTwo:
-    """Where two things happen at once on a curve of bifurcations.
-
-    Attributes
-    ----------
-    kind
-        ``"cusp"``, ``"fold-flip"``, ``"1:1 resonance"``, ``"1:2 resonance"``, ``"1:3 resonance"``,
-        ``"1:4 resonance"``, a kind and the fold or flip that it meets, such as ``"grazing-fold"``, or a kind
-        ``"... at a change"``: the transitions of the orbit change.
-    values
-        The two parameters by name.
-    orbit, message
-        The orbit there, and what happens, in words.
-
-    Examples
-    --------
-    >>> import hybrid, models
-    >>> orbit = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
-    >>> fold = hybrid.continue_orbit(orbit, "w", (0.68, 1.0)).bifurcations[0]
-    >>> curve = hybrid.continue_bifurcation(fold, {"w": (0.6, 1.0), "r": (0.3, 0.9)})
-    >>> [(each.kind, round(each.values["r"], 4)) for each in curve.points]
-    [('fold at a change', 0.355)]
-    """
-
-    kind: str
-    values: Mapping[str, float]
-    orbit: PeriodicOrbit
-    message: str
-
-    def __str__(self) -> str:
-        where = ", ".join(f"{name} = {value:.10g}" for name, value in self.values.items())
-        return f"{self.kind} at {where}: {self.message}"
-
-
-@attrs.frozen(eq=False, repr=False)
-class BifurcationCurve:
-    """A bifurcation over two parameters; ``curve["omega"]`` are the values of one.
-
-    ``curve["peak"]`` is what a function in ``outputs=`` of :func:`hybrid.continue_bifurcation` makes of the
-    orbits.
-
-    Attributes
-    ----------
-    system, kind, names
-        The model, the kind of the bifurcation, and the names of the two parameters.
-    values
-        Their values ``(N, 2)``, in order along the curve.
-    x0, mode, period, multipliers
-        As in :class:`hybrid.Branch`.
-    points
-        Each :class:`hybrid.CodimensionTwo` on the curve, in order.
-    status
-        Why the curve ends where it does.
-    outputs
-        Values ``(N,)`` of the functions in ``outputs=``, by name.
-    output_units
-        Units of these as far as they are known, by name.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> import hybrid, models
-    >>> orbit = hybrid.periodic_orbit(models.impact_oscillator(), (0.9, 1.0))
-    >>> grazing = hybrid.continue_orbit(orbit, "w", (0.9, 1.8)).bifurcations[-1]
-    >>> curve = hybrid.continue_bifurcation(grazing, {"w": (1.3, 1.5), "A": (0.9, 1.1)})
-    >>> w, A = curve["w"], curve["A"]
-    >>> bool(np.allclose((1 - w**2) ** 2 + (0.1 * w) ** 2, A**2))
-    True
-    """
-
-    system: HybridSystem
-    kind: str
-    names: tuple[str, str]
-    values: np.ndarray
-    x0: np.ndarray
-    mode: np.ndarray
-    period: np.ndarray
-    multipliers: np.ndarray
-    points: tuple[CodimensionTwo, ...]
-    status: Status
-    outputs: Mapping[str, np.ndarray]
-    output_units: Mapping[str, str]
-    _orbits: tuple[PeriodicOrbit, ...]
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        if isinstance(name, str) and name in self.outputs:
-            return self.outputs[name]
-        what, kind = "curve: Parameter", "Parameters"
-        if self.outputs:
-            what, kind = "curve: Parameter or output", "Parameters and outputs"
-        arguments.known(what, name, (*self.names, *self.outputs), kind)
-        return self.values[:, self.names.index(name)]
-
-    def __len__(self) -> int:
-        return len(self.values)
-
-    def __repr__(self) -> str:
-        spans = ", ".join(f"{name} = {self[name].min():.6g} to {self[name].max():.6g}" for name in self.names)
-        special = ", ".join(each.kind for each in self.points) or "nothing special"
-        kinds, count = PLURALS.get(self.kind, f"{self.kind}s"), counted(len(self), "point")
-        return f"<Curve of {kinds}, {spans}, {count}, {special}, {self.status.brief}>"
-
-    def orbit(self, i: int) -> PeriodicOrbit:
-        """The orbit of a point of the curve.
-
-        Raises
-        ------
-        ArgumentError
-            If there is no such point.
-        """
-        return self._orbits[arguments.index("i", i, len(self))]
-
-    def to_xarray(self) -> xarray.Dataset:
-        """The curve over the axis ``point``, with both parameters as coordinates.
-
-        Each function in ``outputs=`` has a variable of its name.
-        """
-        import xarray
-
-        names = Names(self.system.state_names, self.system.units)
-        variables: dict[str, Any] = {
-            "x0": (("point", "state"), self.x0, names.states),
-            "mode": ("point", self.mode.astype(str)),
-            "period": ("point", self.period, names.of("t")),
-            "multipliers": (("point", "multiplier"), self.multipliers.astype(complex)),
-        }
-        for name, found in self.outputs.items():
-            unit = {"units": self.output_units[name]} if name in self.output_units else {}
-            variables[name] = ("point", found, unit)
-        coords = {name: ("point", self[name], names.of(name)) for name in self.names}
-        made_by = attributes(f"curve of {PLURALS.get(self.kind, f'{self.kind}s')}", self.status, self.system)
-        return xarray.Dataset(variables, {**coords, **names.coords()}, made_by)
 
 
 def continue_bifurcation(
@@ -304,17 +162,15 @@ def _ranges(parameters: Mapping[str, float], over: object) -> tuple[tuple[str, s
 
 def _start(bifurcation: Bifurcation, names: tuple[str, str], sizes: np.ndarray, solver: Solver) -> Place:
     """The orbit at the bifurcation on the surface over both parameters."""
-    if bifurcation.kind == "branch point":
-        raise ArgumentError(
-            "bifurcation is a branch point, which goes away when another parameter changes; allowed are the "
-            "other kinds."
-        )
+    known_kind = KINDS.get(bifurcation.kind)
+    if known_kind is not None and known_kind.lost:
+        raise ArgumentError(f"bifurcation is {known_kind.lost}; allowed are the other kinds.")
     if bifurcation.kind == "Hopf":
         raise ArgumentError(
             "bifurcation is the Hopf point at which a branch of cycles ends, where no orbit is left; follow "
             "that of the equilibrium, from continue_equilibrium."
         )
-    if bifurcation.kind not in KINDS and bifurcation._zero_of.function is None:
+    if bifurcation.kind not in OF_ORBITS and bifurcation._zero_of.function is None:
         raise ArgumentError(
             f"bifurcation is a zero of events[{bifurcation.kind!r}] of a branch that was opened again or "
             "pickled, which keeps no functions: take it from one that continue_orbit makes."

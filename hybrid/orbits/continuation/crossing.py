@@ -6,7 +6,8 @@ import attrs
 import numpy as np
 
 from hybrid.orbits.continuation.passing import Pass
-from hybrid.orbits.continuation.place import Place, is_real
+from hybrid.orbits.continuation.place import Place
+from hybrid.orbits.continuation.real import is_real
 from hybrid.orbits.continuation.route import Loop
 
 # The first orbit is this far from where the branches meet, in units of its size, or nearer. There is one half

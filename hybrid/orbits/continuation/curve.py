@@ -10,7 +10,8 @@ import attrs
 import numpy as np
 
 from hybrid.orbits.continuation.instants import passes_by
-from hybrid.orbits.continuation.place import Place, is_real
+from hybrid.orbits.continuation.place import Place
+from hybrid.orbits.continuation.real import is_real
 from hybrid.orbits.continuation.smooth import changes, flip, singular, torus
 from hybrid.orbits.zeros import zero_on_the_way
 

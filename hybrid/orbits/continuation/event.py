@@ -1,4 +1,4 @@
-"""What is met between two places of a branch, and the kinds that there are."""
+"""What is met between two places of a branch."""
 
 from __future__ import annotations
 
@@ -10,22 +10,6 @@ import attrs
 from hybrid.orbits.continuation.change import Change
 from hybrid.orbits.continuation.place import Place
 from hybrid.simulation.arc import HybridArc
-
-# Kinds of bifurcations: smooth ones, and those where the sequence of transitions changes.
-KINDS = (
-    "fold",
-    "flip",
-    "torus",
-    "Hopf",
-    "branch point",
-    "grazing",
-    "corner",
-    "border",
-    "crossing-sliding",
-    "grazing-sliding",
-    "switching-sliding",
-    "adding-sliding",
-)
 
 
 @attrs.frozen(eq=False)

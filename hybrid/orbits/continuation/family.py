@@ -12,8 +12,9 @@ import numpy as np
 
 from hybrid.compiler.compiled import CompiledSystem, compile_system
 from hybrid.errors import ArgumentError
+from hybrid.orbits.continuation.equations import CLOSED
 from hybrid.orbits.continuation.flow import Flow, Landing
-from hybrid.orbits.continuation.passing import CLOSED, Pass
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.route import Loop, Route, Stretch
 from hybrid.orbits.held import Held
 from hybrid.simulation.holding import drawn_back

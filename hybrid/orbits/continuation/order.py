@@ -13,7 +13,8 @@ import attrs
 import numpy as np
 
 from hybrid.errors import ArgumentError
-from hybrid.orbits.continuation.passing import CLOSED, Pass
+from hybrid.orbits.continuation.equations import CLOSED
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.simulation.simulate import simulate
 from hybrid.status import Status, StatusCode
 

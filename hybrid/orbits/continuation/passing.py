@@ -8,14 +8,12 @@ from typing import Any
 import attrs
 import numpy as np
 
+from hybrid.orbits.continuation.equations import CLOSED, hold, stretch_by_stretch
 from hybrid.orbits.continuation.flow import Flow, Landing
 from hybrid.orbits.continuation.route import Loop
 from hybrid.orbits.periodic_schur import product_eigenvalues
 from hybrid.simulation.arc import HybridArc
-from hybrid.system.periodicity import closed_change
 
-# The gap of each equation counts as closed at this share of the sizes.
-CLOSED = 1e-10
 # An orbit is a point below this share of its size: the root of rounding, as sizes shrink like roots.
 NO_SIZE = 2.0**-26
 # Places of a stretch at which the size of the states is taken.
@@ -341,7 +339,8 @@ class Pass:
         first = count * n
         matrix, values = (each.copy() for each in self._stretch_by_stretch)
         if self.departure is not None and anchor.departure is not None:
-            self._hold(*self.departure, anchor.departure[1][:, :n], anchor.scale, matrix, values)
+            gradients = anchor.departure[1][:, :n]
+            hold(self.departure, gradients, anchor.scale, (self._first, count), matrix, values)
         self._let_shift(anchor, matrix, values)
         self._close(anchor, matrix[-1], values, first)
         matrix *= units
@@ -352,38 +351,8 @@ class Pass:
     @cached_property
     def _stretch_by_stretch(self) -> tuple[np.ndarray, np.ndarray]:
         """The equations without units and without the last one, which closes the orbit."""
-        count, n = self.loop.x.shape
-        first, last = count * n, count * n + count + 1
-        matrix, values = np.zeros((last, last + len(self.loop.values))), np.zeros(last)
-        for i, (flow, landing) in enumerate(zip(self.flows, self.landings, strict=True)):
-            rows, own, times = slice(i * n, (i + 1) * n), first + i, slice(first + i, first + i + 2)
-            reached = flow.by_unknowns
-            if landing is None:
-                values[rows] = flow.end
-                self._join(i, matrix[own], values, first)
-            else:
-                row = landing.gradient[:n] @ reached
-                row[n + 1] += landing.gradient[-1]
-                row[n + 2 :] += landing.gradient[n:-1]
-                matrix[own, rows], matrix[own, times], matrix[own, last:] = (
-                    row[:n],
-                    row[n : n + 2],
-                    row[n + 2 :],
-                )
-                values[own] = landing.height
-                reached = landing.slopes[:, :n] @ reached
-                reached[:, n + 1] += landing.slopes[:, -1]
-                reached[:, n + 2 :] += landing.slopes[:, n:-1]
-                values[rows] = landing.after
-            matrix[rows, rows] = reached[:, :n]
-            matrix[rows, times] = reached[:, n : n + 2]
-            matrix[rows, last:] = reached[:, n + 2 :]
-        here = np.arange(first)
-        matrix[here, (here + n) % first] -= 1.0
-        change = values[:first].reshape(count, n) - np.roll(self.loop.x, -1, axis=0)
-        turns = self.family.system.turn_lengths[:n]
-        values[:first] = (closed_change(change, turns) if turns.any() else change).ravel()
-        return matrix, values
+        turns = self.family.system.turn_lengths[: self.loop.x.shape[1]]
+        return stretch_by_stretch(self.loop, self.flows, self.landings, turns)
 
     def _let_shift(self, anchor: Pass, matrix: np.ndarray, values: np.ndarray) -> None:
         """A cyclic component has any value at the end of the orbit, and at its start that of the anchor."""
@@ -393,51 +362,6 @@ class Pass:
         matrix[rows] = 0.0
         matrix[rows, own] = 1.0
         values[rows] = self.loop.x[0, own] - anchor.loop.x[0, own]
-
-    def _join(self, i: int, row: np.ndarray, values: np.ndarray, first: int) -> None:
-        """A stretch that goes on smoothly ends at its share of the time between two jumps."""
-        count, times = len(self.flows), self.loop.times
-        if all(landing is None for landing in self.landings):
-            begin, end = 0, count
-            if i == count - 1:
-                # The time of the start stays. The last equation fixes the phase of an autonomous orbit.
-                row[first] = 1.0
-                return
-        else:
-            begin = i
-            while begin > 0 and self.landings[begin - 1] is None:
-                begin -= 1
-            end = i + 1
-            while self.landings[end - 1] is None:
-                end += 1
-        share = (i + 1 - begin) / (end - begin)
-        row[first + i + 1] += 1.0
-        row[first + begin] -= 1.0 - share
-        row[first + end] -= share
-        values[first + i] = times[i + 1] - (1.0 - share) * times[begin] - share * times[end]
-
-    def _hold(
-        self,
-        off: np.ndarray,
-        slopes: np.ndarray,
-        gradients: np.ndarray,
-        scale: np.ndarray,
-        matrix: np.ndarray,
-        values: np.ndarray,
-    ) -> None:
-        """Conserved quantities have the values that they are held at.
-
-        Where all other equations hold, the gap along the ``gradients (h, n)`` is zero by itself. The shortest
-        way to the held values, in units of ``scale (n,)``, is put in its place.
-        """
-        count, n = self.loop.x.shape
-        i, first, last = self._first, count * n, count * n + count + 1
-        rows = np.arange(n) + (i - 1) % count * n
-        back = np.linalg.pinv(gradients * scale, rcond=CLOSED) * scale[:, None]
-        kept = np.eye(n) - back @ gradients
-        matrix[rows], values[rows] = kept @ matrix[rows], kept @ values[rows] + back @ off
-        columns = [*range(i * n, (i + 1) * n), *range(last, matrix.shape[1]), first + i]
-        matrix[np.ix_(rows, columns)] += back @ slopes
 
     def _close(self, anchor: Pass, row: np.ndarray, values: np.ndarray, first: int) -> None:
         """The last equation: the period is that of the forcing, or the time of the start is fixed."""

@@ -7,8 +7,9 @@ from collections.abc import Iterator, Sequence
 import attrs
 import numpy as np
 
+from hybrid.orbits.continuation.equations import CLOSED
 from hybrid.orbits.continuation.order import order_status
-from hybrid.orbits.continuation.passing import CLOSED, Pass
+from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.place import moment, share_of
 from hybrid.orbits.continuation.route import Route
 from hybrid.orbits.orbit import PeriodicOrbit, first_start, shift_over, turns_over, unaged

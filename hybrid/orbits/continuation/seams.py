@@ -7,8 +7,9 @@ from collections.abc import Callable, Iterator
 import attrs
 import numpy as np
 
+from hybrid.orbits.continuation.equations import CLOSED
 from hybrid.orbits.continuation.family import ALONG
-from hybrid.orbits.continuation.passing import CLOSED, Pass
+from hybrid.orbits.continuation.passing import Pass
 
 
 @attrs.frozen

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hybrid.orbits.continuation.passing import CLOSED
+from hybrid.orbits.continuation.equations import CLOSED
 from hybrid.orbits.continuation.place import Place
 
 Test = Callable[[Place], float]

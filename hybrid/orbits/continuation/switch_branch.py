@@ -14,12 +14,10 @@ from hybrid.orbits.continuation.result import Points, orbit_of
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation
 from hybrid.orbits.equilibria.equilibrium import Equilibrium
 from hybrid.orbits.equilibria.switching import switched
+from hybrid.orbits.kinds import KINDS
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.simulation.plan import check_solver
 from hybrid.solvers import Solver, Taylor
-
-# Number of passes of the orbit that make one of the other branch.
-TIMES = {"flip": 2, "branch point": 1}
 
 
 def switch_branch(
@@ -69,7 +67,8 @@ def switch_branch(
     if isinstance(bifurcation, EquilibriumBifurcation):
         return switched(bifurcation, method)
     arguments.instance("bifurcation", bifurcation, Bifurcation, "Take one of branch.bifurcations.")
-    if bifurcation.kind not in TIMES:
+    passes = KINDS[bifurcation.kind].passes if bifurcation.kind in KINDS else 0
+    if not passes:
         beyond = None if bifurcation._change is None else bifurcation._change.onward.place
         if beyond is None:
             raise ArgumentError(
@@ -85,7 +84,7 @@ def switch_branch(
         place = place_on(bifurcation.orbit, (bifurcation.parameter,), sizes, method)
     family = attrs.evolve(place.family, solver=method)
     place = attrs.evolve(place, orbit=attrs.evolve(place.orbit, family=family))
-    found = crossing(place, TIMES[bifurcation.kind])
+    found = crossing(place, passes)
     if found is None:
         raise ArgumentError(f"no other branch is found near the {bifurcation.kind}: tighten solver=.")
     return orbit_of(found, Points(bifurcation.orbit.t0))

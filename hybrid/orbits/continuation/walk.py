@@ -18,10 +18,10 @@ from hybrid.orbits.continuation.place import (
     at_value,
     distance,
     interpolated_zero,
-    is_real,
     refined,
     zero_between,
 )
+from hybrid.orbits.continuation.real import is_real
 from hybrid.orbits.continuation.route import Route
 from hybrid.orbits.continuation.smooth import TESTS, branch_point, changes, told
 from hybrid.simulation.simulate import simulate

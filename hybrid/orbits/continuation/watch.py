@@ -13,10 +13,10 @@ from hybrid import arguments
 from hybrid.errors import ArgumentError
 from hybrid.measures.asked import Unmeasured, answer, told
 from hybrid.measures.measure import Measure
-from hybrid.orbits.continuation.event import KINDS
 from hybrid.orbits.continuation.labelled import THERE
 from hybrid.orbits.continuation.passing import Pass
 from hybrid.orbits.continuation.result import Points, arc_of, orbit_of
+from hybrid.orbits.kinds import OF_ORBITS
 from hybrid.orbits.orbit import PeriodicOrbit, closes
 from hybrid.simulation.arc import HybridArc
 from hybrid.solvers import Solver
@@ -165,7 +165,7 @@ def checked_events(given: object) -> dict[str, OfArc]:
     """The functions that ``events=`` gives; empty for None."""
     found = _functions("events", given)
     for name in found:
-        if name in KINDS:
+        if name in OF_ORBITS:
             raise ArgumentError(f"events: {name!r} is a kind that every branch has; give it another name.")
     return found
 
@@ -190,7 +190,7 @@ def checked_stop(
     wanted = "be a kind of bifurcation, several of them, or a function of an orbit"
     names = [given] if isinstance(given, str) else arguments.items("stop", given, wanted, least=1)
     for name in names:
-        arguments.known("stop: Kind", name, (*KINDS, *events), "Kinds")
+        arguments.known("stop: Kind", name, (*OF_ORBITS, *events), "Kinds")
     return tuple(names), None
 
 

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Any
 import attrs
 
 from hybrid.orbits.continuation.branch import Bifurcation, Branch
-from hybrid.orbits.continuation.event import KINDS
 from hybrid.orbits.diagrams.joined import dataset_of
-from hybrid.orbits.equilibria.branch import KINDS as OF_EQUILIBRIA
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation, EquilibriumBranch
-from hybrid.orbits.kinds import of_kinds
+from hybrid.orbits.kinds import KINDS, of_kinds
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
 
@@ -84,7 +82,7 @@ class Diagram:
         ArgumentError
             If there is no such kind.
         """
-        return of_kinds(self.bifurcations, kinds, dict.fromkeys((*KINDS, *OF_EQUILIBRIA)))
+        return of_kinds(self.bifurcations, kinds, KINDS)
 
     def __len__(self) -> int:
         return len(self.branches)

@@ -27,12 +27,11 @@ from hybrid.orbits.diagrams.store import DiagramStore
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation, EquilibriumBranch
 from hybrid.orbits.equilibria.continue_equilibrium import continue_equilibrium
 from hybrid.orbits.equilibria.equilibrium import Equilibrium
+from hybrid.orbits.kinds import KINDS
 from hybrid.solvers import Solver
 from hybrid.status import SUCCESS, Status, StatusCode
 from hybrid.system.graph import HybridSystem
 
-# Bifurcations from which another branch is followed. At the others the branch goes on by itself.
-SWITCHED = ("flip", "branch point", "Hopf", "boundary")
 # A bifurcation this near to the one at which its branch was found is that one, in units of the range.
 SAME_VALUE = 1e-6
 # A branch is one that is known if all of so many of its orbits but one are.
@@ -161,7 +160,8 @@ class Walker:
         """What begins or crosses at the bifurcations of a branch."""
         how = self.how
         for each in self.branches[i].bifurcations:
-            if each.kind not in SWITCHED or self._is_origin(i, each):
+            kind = KINDS.get(each.kind)
+            if kind is None or not kind.leads_on or self._is_origin(i, each):
                 continue
             if isinstance(each, Bifurcation) and each.kind == "Hopf":
                 # The branch of cycles begins there; the equilibrium is not an orbit.

@@ -13,7 +13,7 @@ from hybrid.display.tables import counted
 from hybrid.orbits.equilibria.equations import Equations
 from hybrid.orbits.equilibria.equilibrium import Equilibrium, described
 from hybrid.orbits.equilibria.labelled import dataset_of
-from hybrid.orbits.kinds import comes_back, of_kinds
+from hybrid.orbits.kinds import OF_EQUILIBRIA, comes_back, of_kinds
 from hybrid.simulation.quantities import Asked, table_of
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
@@ -143,7 +143,7 @@ class EquilibriumBranch(Asked):
         ArgumentError
             If there is no such kind.
         """
-        return of_kinds(self.bifurcations, kinds, KINDS)
+        return of_kinds(self.bifurcations, kinds, OF_EQUILIBRIA)
 
     @property
     def closed(self) -> bool:
@@ -174,6 +174,3 @@ class EquilibriumBranch(Asked):
         branch of it again.
         """
         return dataset_of(self)
-
-
-KINDS = ("fold", "Hopf", "branch point", "boundary")

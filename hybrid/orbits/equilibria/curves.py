@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import attrs
 import numpy as np
 
-from hybrid import arguments
 from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import Progress, progress_bar
-from hybrid.display.tables import counted
 from hybrid.errors import ArgumentError
+from hybrid.orbits.equilibria.bifurcation_curve import EquilibriumCurve, SpecialEquilibrium
 from hybrid.orbits.equilibria.branch import EquilibriumBifurcation
-from hybrid.orbits.equilibria.continue_equilibrium import pair_sums
 from hybrid.orbits.equilibria.curve import Spot, spot_at, walk, zero_between
 from hybrid.orbits.equilibria.defining import (
     BoundaryPoint,
@@ -25,16 +22,13 @@ from hybrid.orbits.equilibria.defining import (
     state_of,
 )
 from hybrid.orbits.equilibria.equations import Equations, Reduced, reduced
-from hybrid.orbits.equilibria.equilibrium import Equilibrium, described, eigenvalues_of
+from hybrid.orbits.equilibria.equilibrium import described, eigenvalues_of
+from hybrid.orbits.equilibria.met import pair_sums
 from hybrid.orbits.equilibria.normal_forms import eigenvectors, fold_forms, lyapunov_at
+from hybrid.orbits.kinds import KINDS
 from hybrid.orbits.zeros import SHARES, at_zero
 from hybrid.simulation.interrupt import interrupted_status
-from hybrid.simulation.labelled import Names, attributes
 from hybrid.status import SUCCESS, Status, StatusCode
-from hybrid.system.graph import HybridSystem
-
-if TYPE_CHECKING:
-    import xarray
 
 ENDS = {
     "range": "the end of a range",
@@ -57,128 +51,6 @@ MESSAGES = {
 }
 
 
-@attrs.frozen(eq=False)
-class SpecialEquilibrium:
-    """Where two things happen at once on a curve of bifurcations of an equilibrium.
-
-    Attributes
-    ----------
-    kind
-        On a curve of folds ``"cusp"`` or ``"Bogdanov-Takens"``, of Hopf points ``"generalized Hopf"``,
-        ``"zero-Hopf"`` or ``"Bogdanov-Takens"``, of boundaries ``"boundary-fold"`` or ``"boundary-Hopf"``.
-    values
-        The two parameters by name.
-    equilibrium, message
-        The equilibrium there, and what happens, in words.
-
-    Examples
-    --------
-    >>> import hybrid
-    >>> cubic = hybrid.HybridSystem(
-    ...     state=("x",),
-    ...     parameters={"a": -2.0, "b": 1.0},
-    ...     modes=[hybrid.Mode("flow", lambda t, x, p: (p.a + p.b * x.x - x.x**3,))],
-    ... )
-    >>> fold = hybrid.continue_equilibrium(hybrid.equilibrium(cubic, (-1.5,)), "a", (-2.0, 2.0)).of("fold")[0]
-    >>> [cusp] = hybrid.continue_bifurcation(fold, {"a": (-2.0, 2.0), "b": (-1.0, 2.0)}).points
-    >>> cusp.kind, abs(cusp.values["b"]) < 1e-10
-    ('cusp', True)
-    """
-
-    kind: str
-    values: Mapping[str, float]
-    equilibrium: Equilibrium
-    message: str
-
-    def __str__(self) -> str:
-        where = ", ".join(f"{name} = {value:.10g}" for name, value in self.values.items())
-        return f"{self.kind} at {where}: {self.message}"
-
-
-@attrs.frozen(eq=False, repr=False)
-class EquilibriumCurve:
-    """A bifurcation of an equilibrium over two parameters; ``curve["q"]`` are the values of one.
-
-    Attributes
-    ----------
-    system, mode, kind, names
-        The model, the mode, the kind of the bifurcation, and the names of the two parameters.
-    values
-        Their values ``(N, 2)``, in order along the curve.
-    x
-        The states ``(N, n)``.
-    eigenvalues
-        As those of :class:`hybrid.Equilibrium`, ``(N, k)``.
-    coefficient
-        The first Lyapunov coefficient along a curve of Hopf points, ``a`` of the normal form along one of
-        folds, ``(N,)``; nan for boundaries.
-    points
-        Each :class:`hybrid.SpecialEquilibrium` on the curve, in order.
-    status
-        Why the curve ends where it does.
-
-    Examples
-    --------
-    >>> import hybrid, models
-    >>> rest = hybrid.equilibrium(models.relief_valve(), (2.5, 0.0, 12.5))
-    >>> branch = hybrid.continue_equilibrium(rest, "q", (1.0, 10.0))
-    >>> curve = hybrid.continue_bifurcation(branch.of("Hopf")[0], {"q": (1.0, 20.0), "kappa": (1.0, 1.5)})
-    >>> [bautin] = curve.points
-    >>> bautin.kind, {name: round(value, 4) for name, value in bautin.values.items()}
-    ('generalized Hopf', {'q': 9.6103, 'kappa': 1.0731})
-    """
-
-    system: HybridSystem
-    mode: str
-    kind: str
-    names: tuple[str, str]
-    values: np.ndarray
-    x: np.ndarray
-    eigenvalues: np.ndarray
-    coefficient: np.ndarray
-    points: tuple[SpecialEquilibrium, ...]
-    status: Status
-    _equations: Equations
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        arguments.known("curve: Parameter", name, self.names, "Parameters")
-        return self.values[:, self.names.index(name)]
-
-    def __len__(self) -> int:
-        return len(self.values)
-
-    def __repr__(self) -> str:
-        spans = ", ".join(f"{name} = {self[name].min():.6g} to {self[name].max():.6g}" for name in self.names)
-        special = ", ".join(each.kind for each in self.points) or "nothing special"
-        what = {"Hopf": "Hopf points", "fold": "folds"}.get(self.kind, "boundaries")
-        return f"<Curve of {what}, {spans}, {counted(len(self), 'point')}, {special}, {self.status.brief}>"
-
-    def equilibrium(self, i: int) -> Equilibrium:
-        """The equilibrium of a point of the curve.
-
-        Raises
-        ------
-        ArgumentError
-            If there is no such point.
-        """
-        i = arguments.index("i", i, len(self))
-        return described(self._equations, np.concatenate([self.x[i, : self._equations.n], self.values[i]]))
-
-    def to_xarray(self) -> xarray.Dataset:
-        """The curve over the axis ``point``, with both parameters as coordinates."""
-        import xarray
-
-        names = Names(self.system.state_names, self.system.units)
-        variables = {
-            "x": (("point", "state"), self.x, names.states),
-            "eigenvalues": (("point", "eigenvalue"), self.eigenvalues),
-            "coefficient": ("point", self.coefficient),
-        }
-        coords = {name: ("point", self[name], names.of(name)) for name in self.names}
-        made_by = attributes(f"curve of {self.kind} of equilibria", self.status, self.system)
-        return xarray.Dataset(variables, {**coords, **names.coords()}, {**made_by, "mode": self.mode})
-
-
 def curve_of(
     bifurcation: EquilibriumBifurcation,
     names: tuple[str, str],
@@ -189,10 +61,9 @@ def curve_of(
 ) -> EquilibriumCurve:
     """The curve of a bifurcation both ways from where it was found; errors are those of the public call."""
     point = bifurcation.equilibrium
-    if bifurcation.kind == "branch point":
+    if KINDS[bifurcation.kind].lost:
         raise ArgumentError(
-            "bifurcation is a branch point, which goes away when another parameter changes; allowed are a "
-            "fold, a Hopf point and a boundary."
+            f"bifurcation is {KINDS[bifurcation.kind].lost}; allowed are a fold, a Hopf point and a boundary."
         )
     vector = point.system.parameter_values(point.parameters)
     equations = Equations(point.system, point.mode, names, point.x, vector)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from typing import Any, Unpack
 
 import attrs
 import numpy as np
@@ -12,11 +11,12 @@ from hybrid import arguments
 from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.progress import progress_bar
 from hybrid.kernels.types import codes
+from hybrid.shared import shares
 from hybrid.simulation.ending import status_of
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names
-from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
+from hybrid.sweep.attractors.asked import AskedOfSearch
 from hybrid.sweep.attractors.attractor import Attractors, unaged
 from hybrid.sweep.attractors.featured import search_of
 from hybrid.sweep.attractors.runs import CODE, OWNER
@@ -24,32 +24,22 @@ from hybrid.sweep.attractors.setup import Setup, setup_of
 from hybrid.sweep.attractors.starts import axes_of, sample_of
 from hybrid.sweep.attractors.stretches import UNMEASURED, features_in
 from hybrid.sweep.local import cores
-from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem
 from hybrid.system.growth import growing
 from hybrid.transform.aged import with_age
 
 
 @growing
+@shares(AskedOfSearch)
 def attractors(
     system: HybridSystem,
     over: Any,
     *,
-    mode: str | None = None,
-    parameters: Mapping[str, float] | None = None,
-    t0: float = 0.0,
-    section: Guard | None = None,
-    interval: float | None = None,
     starts: int = 500,
     seed: int = 0,
-    periods: int = 1000,
-    recurrences: int = 10,
-    tolerance: float = 0.01,
-    features: Any = None,
-    together: float | Mapping[str, float] | None = None,
-    solver: Solver | None = None,
     executor: int | None = None,
     progress: bool | None = None,
+    **asked: Unpack[AskedOfSearch],
 ) -> Attractors:
     """Attractors that random starts lead to, by recurrences of their runs on a section, or by features.
 
@@ -75,35 +65,14 @@ def attractors(
 
     Parameters
     ----------
-    system, mode, parameters, solver
+    system
         As for :func:`hybrid.simulate`.
     over : Mapping[str, float | tuple[float, float] | ArrayLike]
         For each component of the state a number, a range ``(low, high)``, or an array of values to draw from.
         Held components and counters may be left out: they are 0 then.
-    t0
-        Time at the starts; its phase is that of the section of a forced system.
-    section
-        Surface for the points, for autonomous systems or in place of the forcing period.
-    interval
-        Time between two points of an autonomous system without a section; by default the time scale of its
-        field.
     starts, seed
         Number of random starts, and of their sequence. An attractor with a share ``f`` of the starts is
         missed with the probability ``(1 - f) ** starts``.
-    periods
-        Points that a run has to settle.
-    recurrences
-        Points in succession near one attractor that decide a start. With features, the number of points in
-        each of the stretches: more of them make features of chaos scatter less.
-    tolerance
-        Two states are near each other if no component differs by more than this share of the distance by
-        which it changes along the attractor's orbit. Features do not need it.
-    features : Callable | Sequence[Callable] | Mapping[str, Callable], optional
-        What tells attractors apart in place of their points: a function of an arc that gives one number, such
-        as ``maximum("x")`` of `hybrid.measures`; several such functions; or a mapping of names to them.
-    together
-        The widest gap in a feature that a group of runs may have, in the unit of the feature: a number, or a
-        mapping of each feature to one. By default the runs tell it.
     executor : int, optional
         Number of threads; by default all cores.
     progress
@@ -145,20 +114,7 @@ def attractors(
     count = arguments.count("starts", starts, 1)
     origins = with_age(system, sample_of(system, axes, count, arguments.count("seed", seed, 0)))
     threads = cores() if executor is None else arguments.count("executor", executor, 1)
-    given = {
-        "mode": mode,
-        "parameters": parameters,
-        "t0": t0,
-        "section": section,
-        "interval": interval,
-        "periods": periods,
-        "recurrences": recurrences,
-        "tolerance": tolerance,
-        "features": features,
-        "together": together,
-        "solver": solver,
-    }
-    setup = setup_of(system, origins[np.lexsort(origins.T[::-1])[0]], given)
+    setup = setup_of(system, origins, asked)
     search = search_of(setup, threads)
     with CTRL_C, progress_bar(count, "Attractors", as_flag(progress), "start") as bar:
         search.pilot(origins)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import attrs
 import numpy as np
@@ -13,11 +13,12 @@ import numpy as np
 from hybrid.compiler.interrupts import CTRL_C
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
+from hybrid.shared import shares
 from hybrid.simulation.extra import load_xarray
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names
-from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
+from hybrid.sweep.attractors.asked import AskedOfSearch
 from hybrid.sweep.attractors.attractor import Attractors, unaged
 from hybrid.sweep.attractors.attractors import as_flag, status_of_search
 from hybrid.sweep.attractors.featured import search_of
@@ -30,7 +31,6 @@ from hybrid.sweep.attractors.stretches import features_in, measured, untouched
 from hybrid.sweep.local import cores
 from hybrid.sweep.sheet import flags
 from hybrid.sweep.sweep import sweep
-from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, starting_mode
 from hybrid.system.growth import growing
 from hybrid.transform.aged import original_of, with_age
@@ -48,24 +48,15 @@ VIOLATES = -1
 
 
 @growing
+@shares(AskedOfSearch)
 def basins(
     system: HybridSystem,
     over: Any,
     *,
-    mode: str | None = None,
-    parameters: Mapping[str, float] | None = None,
-    t0: float = 0.0,
-    section: Guard | None = None,
-    interval: float | None = None,
-    periods: int = 1000,
-    recurrences: int = 10,
-    tolerance: float = 0.01,
-    features: Any = None,
-    together: float | Mapping[str, float] | None = None,
-    solver: Solver | None = None,
     store: str | PathLike[str] | None = None,
     executor: Any = None,
     progress: bool | None = None,
+    **asked: Unpack[AskedOfSearch],
 ) -> xarray.Dataset:
     """Which attractor each start of a grid leads to, with the attractors.
 
@@ -75,9 +66,7 @@ def basins(
 
     Parameters
     ----------
-    system, mode, parameters, t0, section, interval, periods, recurrences, tolerance, features, together
-        As for :func:`hybrid.attractors`.
-    solver
+    system
         As for :func:`hybrid.simulate`.
     over : Mapping[str, float | tuple[float, float] | ArrayLike]
         For each component of the state a number, which all starts have; an array of values; or a range
@@ -114,24 +103,11 @@ def basins(
     """
     load_xarray()
 
-    axes = axes_of(system, over, RESERVED if features is None else (*RESERVED, *OF_FEATURES))
+    axes = axes_of(system, over, RESERVED if asked["features"] is None else (*RESERVED, *OF_FEATURES))
     shown = as_flag(progress)
     grid = grid_of(system, axes)
     grid = attrs.evolve(grid, origins=with_age(system, grid.origins))
-    given = {
-        "mode": mode,
-        "parameters": parameters,
-        "t0": t0,
-        "section": section,
-        "interval": interval,
-        "periods": periods,
-        "recurrences": recurrences,
-        "tolerance": tolerance,
-        "features": features,
-        "together": together,
-        "solver": solver,
-    }
-    setup = setup_of(system, grid.origins[np.lexsort(grid.origins.T[::-1])[0]], given)
+    setup = setup_of(system, grid.origins, asked)
     threads = executor if isinstance(executor, int) and not isinstance(executor, bool) else None
     search = search_of(setup, max(1, threads or cores()))
     with CTRL_C:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Unpack
 
 import attrs
 import numpy as np
@@ -17,9 +17,10 @@ from hybrid.errors import ArgumentError
 from hybrid.orbits.equilibria.equilibrium import Equilibrium
 from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.orbits.periodic_orbit import out_of_phase
+from hybrid.shared import shares
 from hybrid.simulation.interrupt import interrupted_status
-from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
+from hybrid.sweep.attractors.asked import AskedOfRuns
 from hybrid.sweep.attractors.attractor import Attractor, unaged
 from hybrid.sweep.attractors.attractors import as_flag
 from hybrid.sweep.attractors.closing import BACK, closed
@@ -45,21 +46,15 @@ Saddle = Equilibrium | PeriodicOrbit
 
 
 @growing
+@shares(AskedOfRuns)
 def edge_state(
     system: HybridSystem,
     one: ArrayLike | Mapping[str, float] | Attractor,
     other: ArrayLike | Mapping[str, float] | Attractor,
     *,
-    mode: str | None = None,
-    parameters: Mapping[str, float] | None = None,
-    t0: float = 0.0,
-    interval: float | None = None,
     rounds: int = 100,
-    periods: int = 1000,
-    recurrences: int = 10,
-    tolerance: float = 0.01,
-    solver: Solver | None = None,
     progress: bool | None = None,
+    **asked: Unpack[AskedOfRuns],
 ) -> EdgeState:
     """The saddle on the boundary between the basins of two attractors, by edge tracking.
 
@@ -75,7 +70,7 @@ def edge_state(
 
     Parameters
     ----------
-    system, parameters, solver
+    system
         As for :func:`hybrid.simulate`.
     one, other
         States ``(n,)`` on the two sides, or attractors of :func:`hybrid.attractors`, whose first points are
@@ -84,8 +79,9 @@ def edge_state(
         Mode at the starts. By default that of the attractors, or the one whose guards allow the state, for
         each state between the starts as well. So the starts may be in different modes. Later pairs are taken
         where both runs are in one mode.
-    t0, interval, periods, recurrences, tolerance
-        As for :func:`hybrid.attractors`. An autonomous system is followed at equal times.
+    interval
+        Time between two points of an autonomous system, which is followed at equal times; by default the time
+        scale of its field.
     rounds
         Largest number of bisections that are followed by runs.
     progress
@@ -122,21 +118,10 @@ def edge_state(
     ('equilibrium', True)
     """
     as_system("system", system)
-    rounds = arguments.count("rounds", rounds, 1)
+    rounds, mode = arguments.count("rounds", rounds, 1), asked["mode"]
     shown = as_flag(progress)
     starts = [_start(system, name, each, mode) for name, each in (("one", one), ("other", other))]
-    given = {
-        "mode": mode,
-        "parameters": parameters,
-        "t0": t0,
-        "section": None,
-        "interval": interval,
-        "periods": periods,
-        "recurrences": recurrences,
-        "tolerance": tolerance,
-        "solver": solver,
-    }
-    setup = setup_of(system, starts[0].x, given)
+    setup = setup_of(system, starts[0].x[None], asked)
     _check_times(setup, starts[0])
     destinations = Destinations(setup)
     with CTRL_C:

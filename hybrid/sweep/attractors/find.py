@@ -8,9 +8,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from hybrid.accuracy.averages import TaperedMean, standard_error, taper_inflation
 from hybrid.errors import HybridError
 from hybrid.kernels.types import codes
+from hybrid.measures.averages import TaperedMean, standard_error, taper_inflation
 from hybrid.orbits.factors import fundamental_factors
 from hybrid.orbits.periodic_schur import product_eigenvalues
 from hybrid.orbits.triangles import Triangles

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import attrs
 import numpy as np
@@ -13,11 +13,12 @@ from hybrid import arguments
 from hybrid.compiler.interrupts import CTRL_C
 from hybrid.errors import ArgumentError
 from hybrid.kernels.types import codes
+from hybrid.shared import shares
 from hybrid.simulation.extra import load_xarray
 from hybrid.simulation.interrupt import interrupted_status
 from hybrid.simulation.labelled import Names, attributes
-from hybrid.solvers import Solver
 from hybrid.status import Status, StatusCode
+from hybrid.sweep.attractors.asked import AskedOfSearch
 from hybrid.sweep.attractors.attractor import Attractor
 from hybrid.sweep.attractors.attractors import as_flag, status_of_search
 from hybrid.sweep.attractors.featured import search_of
@@ -27,7 +28,6 @@ from hybrid.sweep.attractors.setup import Setup, digest, setup_of
 from hybrid.sweep.attractors.starts import axes_of, sample_of
 from hybrid.sweep.attractors.text import read, written
 from hybrid.sweep.sweep import sweep
-from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem
 from hybrid.system.growth import growing
 from hybrid.transform.aged import original_of, with_age
@@ -45,27 +45,18 @@ WANTED = 'be None, or map one parameter to its values, as {"w": np.linspace(0.8,
 
 
 @growing
+@shares(AskedOfSearch)
 def basin_fractions(
     system: HybridSystem,
     over: Any,
     *,
     along: Mapping[str, Any] | None = None,
-    mode: str | None = None,
-    parameters: Mapping[str, float] | None = None,
-    t0: float = 0.0,
-    section: Guard | None = None,
-    interval: float | None = None,
     starts: int = 1000,
     seed: int = 0,
-    periods: int = 1000,
-    recurrences: int = 10,
-    tolerance: float = 0.01,
-    features: Any = None,
-    together: float | Mapping[str, float] | None = None,
-    solver: Solver | None = None,
     store: str | PathLike[str] | None = None,
     executor: Any = None,
     progress: bool | None = None,
+    **asked: Unpack[AskedOfSearch],
 ) -> xarray.Dataset:
     r"""Shares of random starts that lead to each attractor, with standard errors; also over a parameter.
 
@@ -80,9 +71,7 @@ def basin_fractions(
 
     Parameters
     ----------
-    system, mode, parameters, t0, section, interval, periods, recurrences, tolerance, features, together
-        As for :func:`hybrid.attractors`.
-    solver
+    system
         As for :func:`hybrid.simulate`.
     over : Mapping[str, float | tuple[float, float] | ArrayLike]
         For each component of the state a number, a range ``(low, high)``, or an array of values to draw from.
@@ -123,22 +112,8 @@ def basin_fractions(
     axes = axes_of(system, over)
     count = arguments.count("starts", starts, 1)
     origins = with_age(system, sample_of(system, axes, count, arguments.count("seed", seed, 0)))
-    name, values = _along(system, along, parameters)
-    given = {
-        "mode": mode,
-        "parameters": parameters,
-        "t0": t0,
-        "section": section,
-        "interval": interval,
-        "periods": periods,
-        "recurrences": recurrences,
-        "tolerance": tolerance,
-        "features": features,
-        "together": together,
-        "solver": solver,
-    }
-    first = origins[np.lexsort(origins.T[::-1])[0]]
-    setup = setup_of(system, first, given)
+    name, values = _along(system, along, asked["parameters"])
+    setup = setup_of(system, origins, asked)
     task = FractionsAt(setup, origins, name)
     shown = as_flag(progress)
     if name is None:

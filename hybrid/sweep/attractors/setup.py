@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from functools import cached_property
 from hashlib import blake2b
 from typing import Any
@@ -19,6 +18,7 @@ from hybrid.simulation.periods import check_time
 from hybrid.simulation.plan import check_solver
 from hybrid.simulation.trajectory import Trajectory, start
 from hybrid.solvers import Solver
+from hybrid.sweep.attractors.asked import AskedOfRuns, AskedOfSearch
 from hybrid.sweep.attractors.features import Features, checked_features
 from hybrid.system.elements import Guard
 from hybrid.system.graph import HybridSystem, as_system, check_mode
@@ -115,18 +115,19 @@ def digest(array: np.ndarray) -> str:
     return blake2b(np.ascontiguousarray(array).tobytes(), digest_size=8).hexdigest()
 
 
-def setup_of(system: HybridSystem, first: np.ndarray, given: Mapping[str, Any]) -> Setup:
+def setup_of(system: HybridSystem, origins: np.ndarray, given: AskedOfRuns) -> Setup:
     """The setup of a search with every argument checked.
 
     The system is the aged one: where a mode is left at a time after its entry, that time is a part of the
-    state. ``first`` is a start that shows the time scale; ``given`` has the arguments of
-    :func:`hybrid.attractors` that are fields of a setup.
+    state. The least of the starts ``origins (N, n)`` shows the time scale, whatever their order. ``given``
+    may be an `AskedOfSearch`, which has a section and features besides.
     """
     as_system("system", system)
+    asked: AskedOfSearch = {"section": None, "features": None, "together": None, **given}
     system = aged(system)
-    overrides = system.variables.overrides(given["parameters"])
+    overrides = system.variables.overrides(asked["parameters"])
     system.parameter_values(overrides)
-    mode, section, interval = given["mode"], given["section"], given["interval"]
+    mode, section, interval = asked["mode"], asked["section"], asked["interval"]
     if mode is not None:
         check_mode(system, mode)
     if section is not None:
@@ -142,14 +143,14 @@ def setup_of(system: HybridSystem, first: np.ndarray, given: Mapping[str, Any]) 
         marked=marked,
         mode=mode,
         parameters=overrides,
-        t0=arguments.number("t0", given["t0"]),
-        solver=check_solver(given["solver"]),
+        t0=arguments.number("t0", asked["t0"]),
+        solver=check_solver(asked["solver"]),
         section=section,
         interval=float(length or forcing or 0.0),
-        periods=arguments.count("periods", given["periods"], 1),
-        recurrences=arguments.count("recurrences", given["recurrences"], 1),
-        tolerance=arguments.positive("tolerance", given["tolerance"], "be a share below 1"),
-        features=checked_features(given.get("features"), given.get("together")),
+        periods=arguments.count("periods", asked["periods"], 1),
+        recurrences=arguments.count("recurrences", asked["recurrences"], 1),
+        tolerance=arguments.positive("tolerance", asked["tolerance"], "be a share below 1"),
+        features=checked_features(asked["features"], asked["together"]),
     )
     known = math.sqrt(found.solver.rtol)
     if not known < found.tolerance < 1.0:
@@ -160,5 +161,6 @@ def setup_of(system: HybridSystem, first: np.ndarray, given: Mapping[str, Any]) 
     check_time("t0", found.t0, forcing or 0.0)
     compile_system(marked)
     if not found.interval:
-        found = attrs.evolve(found, interval=time_scale(found.begin(first, mode)))
+        least = origins[np.lexsort(origins.T[::-1])[0]]
+        found = attrs.evolve(found, interval=time_scale(found.begin(least, mode)))
     return found

@@ -56,10 +56,11 @@ def checks():
                     "solver": SOLVER,
                     "engine": [None, "a", 3, Odd()],
                     "passable": [None, 3, ["nope"], "nope", [3]],
+                    "laws": [3, "a", {}, BALL, Odd()],
                     **(
                         {}
                         if function is hybrid.testing.cases
-                        else {"examples": [0, *COUNT], "progress": [3, "a"], **LAWS}
+                        else {"examples": [0, *COUNT], "progress": [3, "a"]}
                     ),
                 },
             )

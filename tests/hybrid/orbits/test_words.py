@@ -7,9 +7,9 @@ import pytest
 
 import hybrid
 from hybrid.orbits.continuation import continue_orbit, curve
-from hybrid.orbits.continuation.event import KINDS
-from hybrid.orbits.equilibria import branch as of_equilibria
 from hybrid.orbits.equilibria import curves
+from hybrid.orbits.kinds import KINDS, OF_EQUILIBRIA, OF_ORBITS, plural
+from hybrid.plot.branches import OTHERS
 
 DOCS = Path(__file__).parents[3] / "docs"
 OF_TWO_PARAMETERS = {"cusp", "fold-flip", *curve.RESONANCES, *curve.STRONG}
@@ -38,8 +38,8 @@ def quoted(thing):
 @pytest.mark.parametrize(
     ("kinds", "thing", "page", "title"),
     [
-        (KINDS, hybrid.Bifurcation, "branches.md", "kind"),
-        (of_equilibria.KINDS, hybrid.EquilibriumBifurcation, "equilibria.md", "kind"),
+        (OF_ORBITS, hybrid.Bifurcation, "branches.md", "kind"),
+        (OF_EQUILIBRIA, hybrid.EquilibriumBifurcation, "equilibria.md", "kind"),
         (OF_TWO_PARAMETERS, hybrid.CodimensionTwo, "branches.md", "kind of point"),
         (curves.MESSAGES, hybrid.SpecialEquilibrium, "equilibria.md", "kind of point"),
     ],
@@ -52,3 +52,15 @@ def test_docstring_and_page_list_the_kinds_that_are_found(kinds, thing, page, ti
 
 def test_the_page_lists_each_end_of_a_branch_in_the_words_of_the_status():
     assert sorted(table("branches.md", "... at")) == sorted(continue_orbit.ENDS.values())
+
+
+def test_each_kind_has_a_marker_of_its_own():
+    markers = [each.marker for each in KINDS.values()]
+    assert len({*markers, *OTHERS}) == len(markers) + len(OTHERS)
+
+
+def test_a_kind_is_of_orbits_or_of_equilibria_and_has_a_plural():
+    assert all(each.of_orbits or each.of_equilibria for each in KINDS.values())
+    assert plural("torus") == "tori"
+    assert plural("grazing") == "grazings"
+    assert plural("peak") == "peaks"

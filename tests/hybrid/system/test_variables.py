@@ -4,15 +4,8 @@ import pytest
 import models
 from hybrid import simulate
 from hybrid.errors import ArgumentError, ModelError
-from hybrid.system.variables import (
-    MOST_COMPONENTS,
-    PARAMETERS,
-    Variables,
-    as_parameters,
-    as_state,
-    named_values,
-    plain_class,
-)
+from hybrid.system.declared import as_parameters, as_state
+from hybrid.system.variables import MOST_COMPONENTS, PARAMETERS, Variables, named_values, plain_class
 
 
 def test_values_are_read_by_name_by_index_and_in_order():

@@ -72,7 +72,9 @@ def test_members_that_are_not_are_found(change, text):
 def test_the_law_is_one_of_those_of_check_system():
     neurons = attrs.evolve(models.pulse_coupled_neurons(3), laws=Laws())
     ranges = {"states": {"neuron.u": (0.1, 0.9)}, "t_span": (0.0, 0.5), "examples": 3}
-    assert "Members of 'neuron' are alike" in str(check_system(neurons, alike=["neuron"], **ranges))
+    assert "Members of 'neuron' are alike" in str(
+        check_system(neurons, laws=Laws(alike=["neuron"]), **ranges)
+    )
 
 
 def test_what_is_wrong_is_said():

@@ -13,7 +13,7 @@ from hypothesis.errors import UnsatisfiedAssumption
 
 import hybrid
 import models
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
 from hybrid.testing import (
     Case,
     PropertyError,
@@ -31,8 +31,8 @@ from hybrid.testing import (
     small_systems,
     states,
 )
+from hybrid.testing.elastic import ELASTIC
 from hybrid.testing.events import JUMPS, SIDES
-from hybrid.testing.invariance import ELASTIC
 from hybrid.testing.saltation import CONTINUITY, SUM_RULE
 from tests.cases import systems
 
@@ -86,7 +86,7 @@ def rattler():
     [
         (
             models.bouncing_ball(),
-            {"parameters": {"e": 1.0}, "elastic": ("v",)},
+            {"parameters": {"e": 1.0}, "laws": Laws(elastic=("v",))},
             {NOT_CONTINUOUS},
         ),
         (rattler(), {}, {NOT_ELASTIC}),
@@ -183,7 +183,7 @@ class TestStrategies:
             ({"mode": "fligth"}, "Mode 'fligth' does not exist. Modes: flight. Did you mean 'flight'?"),
             ({"passable": ("bonce",)}, "Transition 'bonce' does not exist"),
             ({"examples": 0}, "examples must be a whole number of at least 1"),
-            ({"elastic": ("w",)}, "State component 'w' does not exist"),
+            ({"laws": Laws(elastic=("w",))}, "State component 'w' does not exist"),
         ],
     )
     def test_errors(self, options, text):
@@ -203,7 +203,7 @@ class TestReport:
         text = str(report)
         assert re.search(f"^NOT CHECKED  0 +5 +{JUMPS} +no event on the run$", text, re.MULTILINE)
         assert "NEVER SEEN: bounce. Give ranges that reach them." in text.splitlines()[1]
-        assert "elastic= is not given" in text
+        assert "Laws(elastic=...) is not given" in text
 
     def test_a_property_that_few_examples_reach_is_told_as_hardly_checked(self):
         """Only from the lowest start the ball reaches the floor in time."""

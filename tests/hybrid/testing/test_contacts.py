@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from hybrid import Contact, Guard, HybridSystem, Mode, Transition, mechanics, simulate
+from hybrid import Contact, Guard, HybridSystem, Laws, Mode, Transition, mechanics, simulate
 from hybrid.system.growth import finished
 from hybrid.testing import (
     Case,
@@ -130,7 +130,7 @@ class TestMistakes:
         )
         energy = {"energy": lambda t, x, p: 0.5 * p.m * x.v**2 + p.m * p.g * x.y}
         with pytest.raises(PropertyError, match="'energy' never grows"):
-            check_system(twice, dissipated=energy, states=NEAR, examples=3)
+            check_system(twice, laws=Laws(dissipated=energy), states=NEAR, examples=3)
 
     def test_a_parameter_that_no_contact_reads(self):
         with pytest.raises(PropertyError, match="no function reads parameter 'e'"):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import models
-from hybrid import Guard, HybridSystem, Mode, Reset, Transition
+from hybrid import Guard, HybridSystem, Laws, Mode, Reset, Transition
 from hybrid.testing import PropertyError, check_system
 
 FLIGHT = Mode("flight", lambda t, x, p: (x.v, -9.81))
@@ -155,7 +155,7 @@ def test_runs_are_aimed_at_what_no_run_took():
         )
 
     together = {
-        "equal": {"latched": {"together": lambda t, x, p: x.u - x.v}},
+        "laws": Laws(equal={"latched": {"together": lambda t, x, p: x.u - x.v}}),
         "examples": 20,
         "mode": "apart",
     }

@@ -7,15 +7,14 @@ from hypothesis.errors import UnsatisfiedAssumption
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition
 from hybrid.testing import PropertyError
 from hybrid.testing.case import Case
+from hybrid.testing.elastic import check_elastic, turned
 from hybrid.testing.invariance import (
     check_cut,
-    check_elastic,
     check_names,
     check_order,
     check_samples,
     check_scale,
     check_split,
-    turned,
 )
 from models import bouncing_ball, stick_slip, vibroimpact
 

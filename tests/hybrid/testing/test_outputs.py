@@ -57,17 +57,17 @@ def example(system):
 
 class TestLaws:
     def test_a_list_of_names(self):
-        assert not check(dissipated=["energy"]).never_seen
+        assert not check(laws=Laws(dissipated=["energy"])).never_seen
 
     def test_in_one_mode(self):
-        assert not check(conserved={"flight": {"sum": "energy"}}).never_seen
+        assert not check(laws=Laws(conserved={"flight": {"sum": "energy"}})).never_seen
 
     def test_pairs(self):
         balance = {"contact": {"sum": ("energy", "power")}}
-        assert not check(balance=balance).never_seen
+        assert not check(laws=Laws(balance=balance)).never_seen
 
     def test_a_component_is_named_too(self):
-        assert not check(invariant={"flight": {"above the ground": "q"}}).never_seen
+        assert not check(laws=Laws(invariant={"flight": {"above the ground": "q"}})).never_seen
 
     def test_those_that_a_system_carries(self):
         assert not check(soft_ball(laws=Laws(dissipated=["energy"]))).never_seen
@@ -77,12 +77,12 @@ class TestLaws:
         with pytest.raises(
             PropertyError, match=r"'force' is non-negative: this does not hold[\s\S]*'contact'"
         ):
-            check(invariant=["force"])
+            check(laws=Laws(invariant=["force"]))
 
     def test_a_force_with_the_wrong_sign_is_found(self):
         wrong = soft_ball(outputs={"energy": lambda t, x, p: p.m * (x.v**2 / 2 - p.g * x.q)})
         with pytest.raises(PropertyError, match="'energy' is conserved in mode 'flight'"):
-            check(wrong, conserved={"flight": {"energy": "energy"}})
+            check(wrong, laws=Laws(conserved={"flight": {"energy": "energy"}}))
 
     def test_the_quantity_of_a_case(self):
         system = soft_ball(laws=Laws(invariant=["force"], dissipated=["energy"]))
@@ -106,7 +106,7 @@ class TestLaws:
     )
     def test_errors(self, laws, text):
         with pytest.raises(ArgumentError, match=text):
-            check(**laws)
+            check(laws=Laws(**laws))
 
     def test_an_orbit_holds_a_conserved_output(self):
         pendulum = HybridSystem(

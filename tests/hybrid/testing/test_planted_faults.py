@@ -37,7 +37,7 @@ from hybrid.testing import (
     check_system,
     check_units,
 )
-from hybrid.testing.invariance import ELASTIC
+from hybrid.testing.elastic import ELASTIC
 from tests.cases import systems
 from tests.hybrid.systems import shaken_table
 
@@ -409,7 +409,7 @@ class TestFaultsOfAModel:
 
     def test_a_nudge_after_the_reset(self):
         """Each nudge adds energy to the ball, forwards and backwards in time."""
-        elastic = {"parameters": {"e": 1.0}, "elastic": ("v",)}
+        elastic = {"parameters": {"e": 1.0}, "laws": Laws(elastic=("v",))}
         assert ELASTIC not in check_system(BALL, examples=5, **elastic).unchecked
         told = fails(attrs.evolve(with_transitions(BALL, nudged), laws=Laws()), **elastic)
         assert f"{ELASTIC}: this does not hold for bouncing ball" in told

@@ -16,9 +16,10 @@ from hybrid.testing import (
     check_saltation,
     check_sum_rule,
 )
-from hybrid.testing import saltation as module
 from hybrid.testing.case import Case
 from hybrid.testing.engine import Engine
+from hybrid.testing.saltation import _divergence
+from hybrid.testing.window import STEP, Window
 from tests.hybrid.testing.test_planted_faults import Saltation, reset_only
 
 G, E, C = 9.81, 0.8, 0.3
@@ -64,7 +65,7 @@ def exact(width, length, time):
 @pytest.mark.parametrize(("length", "time"), UNITS)
 def test_a_window_around_a_bounce(length, time):
     case = ball(length, time)
-    window = module._Window(case, case.the_jump())
+    window = Window(case, case.the_jump())
     # The height changes by 0.2 of its size while the speed is at its largest, at the bounce.
     width = 0.2 / np.sqrt(2 * G) * time
     assert window.width == pytest.approx(width, rel=1e-9)
@@ -74,7 +75,7 @@ def test_a_window_around_a_bounce(length, time):
     for found in (differences, window.fundamental(), window.through(window.product())):
         np.testing.assert_allclose(window.scaled(found), window.scaled(wanted), rtol=0, atol=2e-7)
     size = 1.0 + np.abs(window.scaled(wanted)).max()
-    least = (20.0 * (1e-12 + 1e-13) / module.STEP + 1e-7) * size
+    least = (20.0 * (1e-12 + 1e-13) / STEP + 1e-7) * size
     assert np.all(tolerance >= 0.999 * least)
     assert np.all(tolerance <= 1.5 * least)
     check_saltation(case)
@@ -91,17 +92,17 @@ def test_a_window_reaches_half_way_to_the_next_event_if_nothing_bends():
     )
     for fraction, width in ((0.0, 0.5), (0.4, 1.0), (0.9, 0.3)):
         case = Case(system, {}, "run", (0.0, 0.5), 0.0, 5.6, fraction=fraction, solver=DOP853(rtol=1e-12))
-        window = module._Window(case, case.the_jump())
+        window = Window(case, case.the_jump())
         assert window.width == pytest.approx(width, abs=1e-9)
 
 
 def test_tolerances_of_runs_count_in_those_of_differences():
     """At 1e-8 the differences of the flow may be off by 2e-3; at 1e-7 they tell nothing."""
     fine, coarse = (ball(solver=DOP853(rtol=rtol)) for rtol in (1e-8, 1e-7))
-    _, tolerance = module._Window(fine, fine.the_jump()).differences()
+    _, tolerance = Window(fine, fine.the_jump()).differences()
     assert np.all(tolerance > 2e-3)
     with pytest.raises(UnsatisfiedAssumption, match="do not converge"):
-        module._Window(coarse, coarse.the_jump()).differences()
+        Window(coarse, coarse.the_jump()).differences()
 
 
 def test_jumps_at_one_instant_are_multiplied_in_their_order():
@@ -111,7 +112,7 @@ def test_jumps_at_one_instant_are_multiplied_in_their_order():
     def window(*matrices):
         jumps = [SimpleNamespace(saltation=each) for each in matrices]
         made = SimpleNamespace(jump=jumps[0], jumps=jumps, scaled=lambda matrix: matrix)
-        return module._Window.product(made), module._Window.invertible(made)
+        return Window.product(made), Window.invertible(made)
 
     np.testing.assert_array_equal(window(first, second)[0], [[1.0, 2.0], [3.0, 7.0]])
     assert window(first, second)[1]
@@ -139,7 +140,7 @@ def test_integrals_of_the_divergence():
     case = Case(system, {"c": C}, "run", (0.0, 1.0), 0.0, 3.0, solver=DOP853(rtol=1e-12, atol=1e-14))
     assert len(case.run.arc.jumps) == 2
     # The divergence ``t - 1.3`` changes its sign once.
-    total, size = module._divergence(case)
+    total, size = _divergence(case)
     assert total == pytest.approx(4.5 - 1.3 * 3.0, rel=1e-12)
     assert size == pytest.approx(0.5 * (1.3**2 + 1.7**2), rel=3e-2)
 
@@ -306,9 +307,9 @@ class TestSaltation:
                 check_saltation(ball(engine=Off(factor)))
 
     def test_the_matrix_of_the_jump(self, monkeypatch):
-        right = module._Window.product
+        right = Window.product
         for factor in (0.99, 1.01):
-            monkeypatch.setattr(module._Window, "product", lambda window, f=factor: f * right(window))
+            monkeypatch.setattr(Window, "product", lambda window, f=factor: f * right(window))
             with pytest.raises(PropertyError, match="saltation matrix of the jump: "):
                 check_saltation(ball())
 
@@ -318,7 +319,7 @@ class TestSaltation:
                 check_saltation(ball(engine=Off(run=factor)))
 
     def test_runs_that_start_behind_a_passable_guard_are_not_made(self, monkeypatch):
-        monkeypatch.setattr(module._Window, "through", lambda window, xi: 1 / 0)
+        monkeypatch.setattr(Window, "through", lambda window, xi: 1 / 0)
         check_saltation(attrs.evolve(ball(), passable=("bounce",)))
         with pytest.raises(ZeroDivisionError):
             check_saltation(attrs.evolve(ball(), passable=("another",)))

@@ -8,8 +8,8 @@ from scipy.fft import dct
 from scipy.signal import lfilter
 from scipy.stats import norm, t
 
-from hybrid.accuracy import averages
-from hybrid.accuracy.averages import (
+from hybrid.measures import averages
+from hybrid.measures.averages import (
     TaperedMean,
     running_tapered_mean,
     standard_error,
