@@ -48,6 +48,11 @@ class Subject:
     values: Mapping[str, float]
     ranges: Mapping[str, tuple[float, float]]
 
+    @property
+    def title(self) -> str:
+        """The name of the model."""
+        return self.system.name or "Hybrid system"
+
     @cached_property
     def is_forced(self) -> bool:
         """Whether the system declares a forcing period."""
