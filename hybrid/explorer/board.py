@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 
 # Order of the pictures in the script.
 PICTURES = ("live", "exponents", "orbit", "branch", "basins", "diagram")
+# Attractors that are told one by one.
+MOST_NAMED = 8
 # What is said about pictures that are computed together.
 TOGETHER: Mapping[str, tuple[str, ...]] = MappingProxyType({"live": ("portrait", "section")})
 
@@ -190,9 +193,7 @@ class Board:
         self.calls["basins"], self.results["basins"] = (call,), found
         label = found.label.transpose(scene.up, scene.across).values
         self.figures.section.show_basins(label, found[scene.across].values, found[scene.up].values)
-        numbers, kinds = found.attractor.values.tolist(), found.kind.values.tolist()
-        told = ", ".join(f"{number} {kind}" for number, kind in zip(numbers, kinds, strict=True))
-        said = [f"{told or 'no attractor was found'}."]
+        said = [f"{_attractors(found.attractor.values.tolist(), found.kind.values.tolist())}."]
         if mode:
             said.append(
                 f"Several modes allow some of these starts: all are in mode {mode!r}. Choose another one "
@@ -216,6 +217,16 @@ class Board:
     def chart(self, scene: Scene) -> xarray.Dataset | None:
         """The diagram as far as it has been computed; None if it has not begun."""
         return joined(scene, self.charts) if self.charts else None
+
+
+def _attractors(numbers: list[int], kinds: list[str]) -> str:
+    """Each attractor with its kind, or how many there are of each kind."""
+    if not numbers:
+        return "no attractor was found"
+    if len(numbers) <= MOST_NAMED:
+        return ", ".join(f"{number} {kind}" for number, kind in zip(numbers, kinds, strict=True))
+    counts = ", ".join(f"{count} {kind}" for kind, count in Counter(kinds).items())
+    return f"{len(numbers)} attractors: {counts}"
 
 
 def _is_told(status: Status) -> bool:

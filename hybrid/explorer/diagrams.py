@@ -87,7 +87,7 @@ def remark(scene: Scene, charts: Sequence[xarray.Dataset]) -> str:
     """What is to be said of the columns so far: why there are none, or why some are missing."""
     codes = np.concatenate([each.status.values for each in charts])
     early = codes != StatusCode.SUCCESS
-    drawn = any(np.isfinite(each.section.values).all(axis=-1).any() for each in charts)
+    drawn = any("section" in each and np.isfinite(each.section.values).all(axis=-1).any() for each in charts)
     passes = "jumps" if scene.section == JUMPS else "passes the section"
     if not early.any():
         return "" if drawn else f"it has no column, since no run {passes}. {ELSEWHERE}"

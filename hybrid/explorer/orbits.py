@@ -26,12 +26,16 @@ from hybrid.status import StatusCode
 
 # A section repeats if it comes back after no more points than these, to this share of the extent of the arc.
 MOST_DOTS, SAME = 16, 1e-4
+# The extent of a component that rests, as a share of its size: it changes by rounding.
+LEAST_EXTENT = 1e-6
 # Points at the end of the section that are looked at: the points before may not have settled yet.
 LOOKED_AT = 4 * MOST_DOTS
 # Numbers of periods that are tried where the section does not repeat.
 TURNS = 4
 # An orbit that comes so near to the guess is the one that the section shows, as a share of the arc.
 PASSES = 1e-2
+# Points of an unforced orbit that are compared with the guess.
+POINTS = 2000
 # An arc has come back if it is so near, as a share of the distance that it goes away.
 NEAR = 0.1
 # Part of the period between a point of the section and the guess, which should be no point of the section.
@@ -135,13 +139,12 @@ def searched(subject: Subject, scene: Scene, live: Live) -> Search:
     Where the section repeats, the orbit closes after as many periods as the section has dots; fewer periods
     are tried only if it does not. Where it does not repeat, the first orbit that closes is taken.
     """
-    size = np.ptp(live.arc.x, axis=0)
-    size = np.where(size > 0.0, size, 1.0)
+    size = _size(live.arc.x)
     guesses = _forced if subject.is_forced else _unforced
     dots, calls = guesses(subject, scene, live, size)
     tried: list[Attempt] = []
     for what, call in calls:
-        attempt = _attempted(what, call, size)
+        attempt = _attempted(subject, what, call, size)
         tried.append(attempt)
         if attempt.orbit is not None and attempt.orbit.status.code == StatusCode.INTERRUPTED:
             break
@@ -159,13 +162,33 @@ def _why(dots: int | None, forced: bool) -> str:
     return f"The {what} repeats after {counted(dots, unit)}. "
 
 
-def _attempted(what: str, call: Call, size: np.ndarray) -> Attempt:
+def _size(x: np.ndarray) -> np.ndarray:
+    """The extent of each component ``(n,)`` on an arc; one that rests has a small share of what it is."""
+    size = np.maximum(np.ptp(x, axis=0), LEAST_EXTENT * np.abs(x).max(axis=0))
+    return np.where(size > 0.0, size, 1.0)
+
+
+def _attempted(subject: Subject, what: str, call: Call, size: np.ndarray) -> Attempt:
+    guess = np.asarray(call.arguments[1])
     try:
         orbit = call.result()
+        near = orbit.x0[None]
+        if orbit.closes and not subject.is_forced:
+            # Of an unforced orbit any point may be the nearest one.
+            arc = orbit.arc()
+            near = arc(np.linspace(arc.t[0], arc.t[-1], POINTS))
     except HybridError as error:
         return Attempt(what, call, problem=str(error))
-    away = np.abs(orbit.x0 - np.asarray(call.arguments[1])) / size
-    return Attempt(what, call, orbit, float(away.max()))
+    away = np.abs(_change(subject, near, guess)) / size[: subject.system.tangent_dimension]
+    return Attempt(what, call, orbit, float(away.max(axis=1).min()))
+
+
+def _change(subject: Subject, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Differences of states, with angles up to whole turns, and without counters."""
+    k = subject.system.tangent_dimension
+    turns = np.asarray(subject.system.turn_lengths, dtype=float)[:k]
+    change = x[..., :k] - y[..., :k]
+    return change - turns * np.round(change / np.where(turns > 0.0, turns, 1.0))
 
 
 def _numbers(scene: Scene, dots: int | None) -> Iterable[int]:
@@ -240,13 +263,9 @@ def repeats_after(subject: Subject, x: np.ndarray, size: np.ndarray) -> int | No
 
     ``size (n,)`` is the extent of the arc. Angles are compared up to whole turns, and counters are left out.
     """
-    k = subject.system.tangent_dimension
-    turns = np.asarray(subject.system.turn_lengths, dtype=float)[:k]
-    tail = x[-LOOKED_AT:, :k]
+    tail, least = x[-LOOKED_AT:], SAME * size[: subject.system.tangent_dimension]
     for dots in range(1, min(MOST_DOTS, len(tail) // 2) + 1):
-        change = tail[dots:] - tail[:-dots]
-        change = change - turns * np.round(change / np.where(turns > 0.0, turns, 1.0))
-        if (np.abs(change) <= SAME * size[:k]).all():
+        if (np.abs(_change(subject, tail[dots:], tail[:-dots])) <= least).all():
             return dots
     return None
 

@@ -49,20 +49,27 @@ def saved_figure(
         raise ArgumentError(f"Save: nothing has been drawn of {picture!r} yet. Switch it on, or wait.")
     with plot.style("paper"):
         made = Figure(figsize=current().size(OF_TWO if picture == "diagram" else SIZE))
-        _draw(made, scene, picture, live, found)
+        if picture == "diagram":
+            _draw_diagram(made, scene, found, results.get("branch"))
+        else:
+            _draw(made.subplots(), scene, picture, live, found)
         file = BytesIO()
         made.savefig(file, format=suffix)
     file.seek(0)
     return file
 
 
-def _draw(made: Any, scene: Scene, picture: str, live: Live, found: Any) -> None:
-    """Draw a picture into a figure, as the script of the page does."""
+def _draw_diagram(made: Any, scene: Scene, chart: Any, branch: Any) -> None:
+    """Draw the diagram over the exponents, with the branch that the page shows on it."""
+    axes = made.subplots(2, sharex=True)
+    plot_chart(chart, scene.across, ax=axes)
+    if branch is not None:
+        plot.plot_branch(branch, scene.across, ax=axes[0]).set_xlabel("")
+
+
+def _draw(ax: Any, scene: Scene, picture: str, live: Live, found: Any) -> None:
+    """Draw a picture of one part, as the script of the page does."""
     across, up = scene.across, scene.up
-    if picture == "diagram":
-        plot_chart(found, across, ax=made.subplots(2, sharex=True))
-        return
-    ax = made.subplots()
     match picture:
         case "portrait":
             plot.plot_phase(live.arc, across, up, ax=ax)
