@@ -119,8 +119,13 @@ def assert_fits(page, width):
 # Texts that the browser draws into the canvases of the figures, with the rectangles that they fill.
 TEXTS = """
 const done = arguments[arguments.length - 1];
-const drawn = new Map(), plain = CanvasRenderingContext2D.prototype.fillText;
-CanvasRenderingContext2D.prototype.fillText = function (text, x, y, ...rest) {
+const drawn = new Map(), context = CanvasRenderingContext2D.prototype;
+const plain = context.fillText, clear = context.clearRect;
+context.clearRect = function (...given) {
+    drawn.delete(this.canvas);
+    return clear.apply(this, given);
+};
+context.fillText = function (text, x, y, ...rest) {
     const size = this.measureText(text), at = this.getTransform();
     if (at.b === 0) {
         const corner = (dx, dy) => [at.a * (x + dx) + at.e, at.d * (y + dy) + at.f];
@@ -133,7 +138,8 @@ CanvasRenderingContext2D.prototype.fillText = function (text, x, y, ...rest) {
 };
 for (const name of arguments[0]) Bokeh.index.find_one_by_id(figure(name).id).request_paint();
 setTimeout(() => {
-    CanvasRenderingContext2D.prototype.fillText = plain;
+    context.fillText = plain;
+    context.clearRect = clear;
     done([...drawn.values()].map((each) => [...each.values()]));
 }, 500);
 """
@@ -145,7 +151,8 @@ FIGURES = ["portrait", "section", "series", "exponents", "diagram", "largest", "
 
 
 def assert_texts_are_apart(page):
-    """No label of an axis runs into another text of its figure."""
+    """No label of an axis runs into another text of its figure, once all figures have their contents."""
+    wait(page, "return models.some((each) => each.type.endsWith('Progress') && each.value === 100)", 120)
     figures = page.execute_async_script(TOOLS + TEXTS, FIGURES)
     assert len(figures) == len(FIGURES)
     for texts in figures:
