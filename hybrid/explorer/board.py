@@ -47,7 +47,7 @@ class Board:
     results, calls
         By picture: what is shown, and the calls that gave it.
     words
-        What is said, by the names of ``messages.SUBJECTS``.
+        What is said, by the names of ``messages.ABOUT``.
     charts
         The columns of the diagram that have been computed, in parts.
     progress

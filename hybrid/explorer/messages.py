@@ -12,7 +12,7 @@ TOP, PORTRAIT, SECTION, EXPONENTS, DIAGRAM, MULTIPLIERS, JUMPS = PLACES
 
 
 @attrs.frozen
-class Subject:
+class About:
     """What a sentence is about: its place on the page, and its name (empty if the sentence names it)."""
 
     place: str
@@ -20,18 +20,18 @@ class Subject:
 
 
 # In the order in which a sentence about several of them names them.
-SUBJECTS = {
-    "file": Subject(TOP),
-    "address": Subject(TOP),
-    "saved": Subject(TOP),
-    "jumps": Subject(JUMPS),
-    "portrait": Subject(PORTRAIT, "portrait"),
-    "section": Subject(SECTION, "section"),
-    "exponents": Subject(EXPONENTS, "exponents"),
-    "orbit": Subject(MULTIPLIERS, "orbit"),
-    "branch": Subject(DIAGRAM, "branch"),
-    "diagram": Subject(DIAGRAM, "diagram"),
-    "basins": Subject(SECTION, "basins"),
+ABOUT = {
+    "file": About(TOP),
+    "address": About(TOP),
+    "saved": About(TOP),
+    "jumps": About(JUMPS),
+    "portrait": About(PORTRAIT, "portrait"),
+    "section": About(SECTION, "section"),
+    "exponents": About(EXPONENTS, "exponents"),
+    "orbit": About(MULTIPLIERS, "orbit"),
+    "branch": About(DIAGRAM, "branch"),
+    "diagram": About(DIAGRAM, "diagram"),
+    "basins": About(SECTION, "basins"),
 }
 
 
@@ -41,21 +41,21 @@ def placed(words: Mapping[str, str]) -> dict[str, list[str]]:
     Parameters
     ----------
     words
-        What is said, by a name of ``SUBJECTS``; empty texts say nothing.
+        What is said, by a name of ``ABOUT``; empty texts say nothing.
 
     Returns
     -------
     dict
         The sentences of each of ``PLACES``, with the names of what they are about.
     """
-    about: dict[str, list[Subject]] = {}
-    for name, subject in SUBJECTS.items():
+    about: dict[str, list[About]] = {}
+    for name, each in ABOUT.items():
         if text := words.get(name):
-            about.setdefault(text, []).append(subject)
+            about.setdefault(text, []).append(each)
     found: dict[str, list[str]] = {place: [] for place in PLACES}
-    for text, subjects in about.items():
-        places = {each.place for each in subjects}
-        names = enumerated([each.name for each in subjects if each.name])
+    for text, things in about.items():
+        places = {each.place for each in things}
+        names = enumerated([each.name for each in things if each.name])
         head = f"{names[0].upper()}{names[1:]}: " if names else ""
         found[places.pop() if len(places) == 1 else TOP].append(head + text)
     return found

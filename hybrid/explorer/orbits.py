@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
+from hybrid.compiler.interrupts import CTRL_C
 from hybrid.display.tables import counted
 from hybrid.errors import ArgumentError, HybridError
 from hybrid.explorer.calls import Call, Written
@@ -75,6 +76,12 @@ class Search:
     found: Attempt | None
 
     @property
+    def is_complete(self) -> bool:
+        """Whether no attempt was interrupted."""
+        ends = [each.orbit.status.code for each in self.tried if each.orbit is not None]
+        return StatusCode.INTERRUPTED not in ends
+
+    @property
     def told(self) -> str:
         """Which periods were tried, and why these."""
         each = ", ".join(f"{attempt.what} ({self._outcome(attempt)})" for attempt in self.tried)
@@ -123,7 +130,7 @@ class Finder:
         if self.known is not None and self.known[0] == key:
             return self.known[1]
         search = searched(self.subject, scene, self.last)
-        if search.found is not None:
+        if search.found is not None and search.is_complete:
             self.known = key, search
         return search
 
@@ -146,7 +153,7 @@ def searched(subject: Subject, scene: Scene, live: Live) -> Search:
     for what, call in calls:
         attempt = _attempted(subject, what, call, size)
         tried.append(attempt)
-        if attempt.orbit is not None and attempt.orbit.status.code == StatusCode.INTERRUPTED:
+        if CTRL_C.is_set():
             break
         if attempt.closes and (dots is None or attempt.distance < PASSES):
             break

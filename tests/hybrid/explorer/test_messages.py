@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybrid.explorer.messages import PLACES, SUBJECTS, placed
+from hybrid.explorer.messages import ABOUT, PLACES, placed
 
 TEXTS = st.sampled_from(["", "it ended.", "nothing was found.", "too large."])
 
@@ -27,7 +27,7 @@ def test_what_is_in_one_place_stays_there():
     ]
 
 
-@given(st.dictionaries(st.sampled_from(list(SUBJECTS)), TEXTS))
+@given(st.dictionaries(st.sampled_from(list(ABOUT)), TEXTS))
 def test_every_sentence_is_said_once(words):
     said = [text for texts in placed(words).values() for text in texts]
     wanted = {text for text in words.values() if text}
