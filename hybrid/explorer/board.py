@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from hybrid.display.tables import counted, with_unit
+from hybrid.display.tables import counted, measured
 from hybrid.explorer.calls import Call, script
 from hybrid.explorer.diagrams import diagram_call, joined, remark
 from hybrid.explorer.figures.all import Figures
@@ -165,7 +165,7 @@ class Board:
         self.words["orbit"] = f"{self._described(orbit, arc.jump_count)} {told}"
 
     def _described(self, orbit: PeriodicOrbit, jumps: int) -> str:
-        period = with_unit(f"{orbit.period:.6g}", self.subject.system.units.get("t"))
+        period = measured(f"{orbit.period:.6g}", self.subject.system.units.get("t"))
         moduli = np.sort(np.abs(orbit.multipliers))[::-1]
         if not self.subject.is_forced:
             # An unforced orbit has the multiplier 1 of its phase; of one state there is no other.

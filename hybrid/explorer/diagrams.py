@@ -29,7 +29,6 @@ NO_PARAMETER = (
     "the model has no parameter to draw it over. Give it one: HybridSystem(parameters={...}), and read it in "
     "the functions of the model as p.name."
 )
-COMING = "its columns are being computed."
 ELSEWHERE = "Choose another section, or another level, under 'Section and portrait'."
 
 

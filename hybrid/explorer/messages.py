@@ -10,6 +10,8 @@ import attrs
 PLACES = ("top", "portrait", "section", "exponents", "diagram", "multipliers", "jumps")
 TOP, PORTRAIT, SECTION, EXPONENTS, DIAGRAM, MULTIPLIERS, JUMPS = PLACES
 
+COMING = "being computed."
+
 
 @attrs.frozen
 class About:
@@ -31,6 +33,7 @@ ABOUT = {
     "orbit": About(MULTIPLIERS, "orbit"),
     "branch": About(DIAGRAM, "branch"),
     "diagram": About(DIAGRAM, "diagram"),
+    "range": About(DIAGRAM, "diagram"),
     "basins": About(SECTION, "basins"),
 }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from io import BytesIO
 from threading import Event
 from typing import Any
@@ -12,10 +12,11 @@ import panel as pn
 
 from hybrid.errors import ArgumentError, HybridError
 from hybrid.explorer.board import Board
-from hybrid.explorer.diagrams import COMING, NO_PARAMETER, diagram_job
+from hybrid.explorer.diagrams import NO_PARAMETER, diagram_job
 from hybrid.explorer.events import described_jump
 from hybrid.explorer.figures.all import Figures
 from hybrid.explorer.layout import arranged
+from hybrid.explorer.messages import COMING
 from hybrid.explorer.orbits import Finder, branch_job, orbit_job
 from hybrid.explorer.painted import basins_job
 from hybrid.explorer.pictures import Live, changed, exponents_job, live_job
@@ -101,9 +102,10 @@ class Page:
         if "over" in changed:
             scene = over_parameter(self.subject, scene, scene.over)
         self.scene = scene
-        if not scene.low < scene.high:
-            # One end is typed before the other: the diagram waits until both are there.
-            self.board.words["diagram"] = f"it needs from < to; got {scene.low:g} and {scene.high:g}."
+        # One end is typed before the other: the diagram waits until both are there.
+        waits = not scene.low < scene.high
+        ends = f"it needs from < to; got {scene.low:g} and {scene.high:g}."
+        self.board.words["range"] = ends if waits else ""
         self.board.choose(scene)
         self.refresh()
 
@@ -143,6 +145,7 @@ class Page:
     def reset(self) -> None:
         """Return to the first scene."""
         self.scene, _ = from_query(self.subject, {})
+        self.board.words |= {"address": "", "range": ""}
         self.board.choose(self.scene)
         self.refresh()
 
@@ -211,14 +214,18 @@ class Page:
             jobs.append(basins_job(subject, scene, mode, *self.board.figures.section.plane))
         if has_range:
             jobs.append(diagram_job(subject, scene))
-        if not self.board.charts:
-            words = self.board.words
-            if not scene.over:
-                words["diagram"] = NO_PARAMETER
-            elif has_range and not words.get("diagram"):
-                words["diagram"] = COMING
+        self._announce([each.picture for each in jobs])
         self.widgets.say(self.board.words)
         self.worker.want(jobs)
+
+    def _announce(self, pictures: Sequence[str]) -> None:
+        """Say of the diagram, and of what is switched on, that it is not there yet or cannot be."""
+        words = self.board.words
+        for picture in (*self.widgets.switches, "diagram"):
+            if picture in pictures and picture not in self.board.calls and not words.get(picture):
+                words[picture] = COMING
+        if not self.scene.over:
+            words["diagram"] = NO_PARAMETER
 
     def _have_shown(self, outcome: Outcome) -> None:
         """Have a result shown, and wait until it is: further work would only slow down what is looked at."""

@@ -30,6 +30,9 @@ def test_the_ends_of_the_diagram_are_typed_one_after_the_other(opened):
     page = opened(models.impact_oscillator)
     page.change(low=5.0)
     assert "Diagram: it needs from" in said(page)
+    page.change(low=0.5)
+    assert "it needs from" not in said(page)
+    page.change(low=5.0)
     page.change(high=6.0)
     assert page.worker.wait(60)
     assert (page.scene.low, page.scene.high) == (5.0, 6.0)
@@ -83,7 +86,10 @@ class TestADiagramWithoutColumnsSaysWhy:
     def test_it_is_not_there_yet(self):
         waiting = []
         page = Page(subject(models.impact_oscillator(), ""), {}, waiting.append)
-        assert "its columns are being computed" in self.why(page)
+        assert "Diagram: being computed." in page.widgets.messages["diagram"].text
+        assert self.why(page) == "being computed."
+        page.widgets.switches["branch"].value = True
+        assert "Branch and diagram: being computed." in page.widgets.messages["diagram"].text
         page.close(wait=False)
 
     def test_it_is_silent_where_there_are_columns(self, opened):
