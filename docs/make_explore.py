@@ -21,9 +21,9 @@ import models
 # The three regimes of the paper: an orbit of one period, a torus, chaos.
 FRAMES = np.concatenate([np.linspace(7.40, 7.54, 15), np.linspace(7.56, 7.92, 13)])
 WIDTH, HEIGHT = 1280, 1560
-STILL = (0, 0, WIDTH, 1300)
+STILL = (0, 0, WIDTH, 1330)
 # The part of the page that is animated, its width then, and milliseconds per frame.
-PART, SHOWN, PACE = (0, 0, 1280, 730), 800, 180
+PART, SHOWN, PACE = (0, 0, 1280, 770), 800, 180
 MODELS = "const all = [...(globalThis.Bokeh?.documents[0]?._all_models.values() ?? [])];"
 IS_DRAWN = f"""{MODELS}
     return all.some((each) => each.type.endsWith("Progress") && each.value === 100)"""

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections import Counter
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
-from hybrid.display.tables import counted, with_unit
+from hybrid.display.tables import counted, measured
 from hybrid.explorer.calls import Call, script
+from hybrid.explorer.diagrams import diagram_call, joined, remark
 from hybrid.explorer.figures.all import Figures
 from hybrid.explorer.figures.base import extent_of
-from hybrid.explorer.pictures import Live, diagram_call, points_of_orbit, start_row
+from hybrid.explorer.orbits import points_of_orbit
+from hybrid.explorer.pictures import Live, start_row
 from hybrid.explorer.scene import Scene
 from hybrid.explorer.subject import Subject
 from hybrid.explorer.worker import Outcome
@@ -20,8 +24,15 @@ from hybrid.orbits.orbit import PeriodicOrbit
 from hybrid.simulation.arc import HybridArc
 from hybrid.status import Status, StatusCode
 
+if TYPE_CHECKING:
+    import xarray
+
 # Order of the pictures in the script.
 PICTURES = ("live", "exponents", "orbit", "branch", "basins", "diagram")
+# Attractors that are told one by one.
+MOST_NAMED = 8
+# What is said about pictures that are computed together.
+TOGETHER: Mapping[str, tuple[str, ...]] = MappingProxyType({"live": ("portrait", "section")})
 
 
 @attrs.define(eq=False)
@@ -33,8 +44,12 @@ class Board:
     live, orbit
         The last section and arc; the orbit that is shown, between the scene where it was looked for and its
         arc.
-    results, calls, words
-        By picture: what is shown, the calls that gave it, and what is said about it.
+    results, calls
+        By picture: what is shown, and the calls that gave it.
+    words
+        What is said, by the names of ``messages.ABOUT``.
+    charts
+        The columns of the diagram that have been computed, in parts.
     progress
         Share of the diagram that is drawn, 0 to 1.
     """
@@ -46,27 +61,45 @@ class Board:
     results: dict[str, Any] = attrs.field(factory=dict)
     calls: dict[str, tuple[Call, ...]] = attrs.field(factory=dict)
     words: dict[str, str] = attrs.field(factory=dict)
+    charts: list[xarray.Dataset] = attrs.field(factory=list)
     progress: float = 0.0
 
     def show(self, outcome: Outcome) -> None:
         """Draw a result, or say why there is none."""
         picture = outcome.job.picture
-        self.words[picture] = outcome.problem
-        if not outcome.problem:
-            draw: Callable[[Outcome], None] = getattr(self, f"_show_{picture}")
-            draw(outcome)
+        for each in TOGETHER.get(picture, (picture,)):
+            self.words[each] = outcome.problem
+        if outcome.problem:
+            # A section stays while a slider passes a value that cannot be; all else would be that of another.
+            if picture != "live":
+                self._take_away(picture)
+            return
+        draw: Callable[[Outcome], None] = getattr(self, f"_show_{picture}")
+        draw(outcome)
 
     def clear(self, picture: str) -> None:
         """Take away what was switched off."""
+        self.words.pop(picture, None)
+        self._take_away(picture)
+
+    def _take_away(self, picture: str) -> None:
         self.calls.pop(picture, None)
         self.results.pop(picture, None)
-        self.words.pop(picture, None)
-        if picture == "orbit":
-            self._clear_orbit()
-        elif picture == "branch":
-            self.figures.diagram.show_branch(None)
-        elif picture == "basins":
-            self.figures.section.clear_basins()
+        match picture:
+            case "orbit":
+                self.orbit = None
+                self.figures.arc.show_orbit(None)
+                self.figures.section.show_orbit(())
+                self.figures.multipliers.show(None)
+            case "branch":
+                self.figures.diagram.show_branch(None)
+            case "basins":
+                self.figures.section.clear_basins()
+            case "exponents":
+                self.figures.exponents.clear()
+            case "diagram":
+                self.charts.clear()
+                self.figures.diagram.begin()
 
     def script(self, scene: Scene) -> str:
         """Python that computes and draws what is shown."""
@@ -83,7 +116,7 @@ class Board:
             "orbit": f"hybrid.plot.plot_orbit(orbit, {across!r}, {up!r})",
             "branch": f"hybrid.plot.plot_branch(branch, {across!r})",
             "painted": "hybrid.plot(painted)",
-            "diagram": "hybrid.plot(diagram)",
+            "diagram": f"hybrid.plot(diagram, component={across!r})",
         }
         spectrum = self.results.get("exponents")
         if spectrum is not None and not spectrum.intervals:
@@ -96,10 +129,8 @@ class Board:
         live = self.live = outcome.result
         self.calls["live"] = live.calls
         self._draw_live(live)
-        ends = {"Section": live.points.status, "Arc": live.arc.status}
-        self.words["live"] = " ".join(
-            f"{what}: {status}" for what, status in ends.items() if _is_told(status)
-        )
+        for what, status in (("section", live.points.status), ("portrait", live.arc.status)):
+            self.words[what] = str(status) if _is_told(status) else ""
 
     def _draw_live(self, live: Live) -> None:
         names = self.figures.states.shown
@@ -124,28 +155,24 @@ class Board:
         call, spectrum = outcome.result
         self.calls["exponents"], self.results["exponents"] = (call,), spectrum
         self.figures.exponents.show(spectrum)
-        self.words["exponents"] = "" if spectrum.status.ok else f"Exponents: {spectrum.status}"
+        self.words["exponents"] = "" if spectrum.status.ok else str(spectrum.status)
 
     def _show_orbit(self, outcome: Outcome) -> None:
-        scene, call, orbit, arc = outcome.result
+        scene, call, orbit, arc, told = outcome.result
         self.calls["orbit"], self.results["orbit"] = (call,), orbit
-        if arc is None:
-            self._clear_orbit()
-            self.words["orbit"] = f"Orbit: {orbit.status}"
-            return
         self.orbit = scene, orbit, arc
         self._draw_orbit(scene, orbit, arc)
-        period = with_unit(f"{orbit.period:.6g}", self.subject.system.units.get("t"))
+        self.words["orbit"] = f"{self._described(orbit, arc.jump_count)} {told}"
+
+    def _described(self, orbit: PeriodicOrbit, jumps: int) -> str:
+        period = measured(f"{orbit.period:.6g}", self.subject.system.units.get("t"))
         moduli = np.sort(np.abs(orbit.multipliers))[::-1]
         if not self.subject.is_forced:
             # An unforced orbit has the multiplier 1 of its phase; of one state there is no other.
             moduli = np.delete(moduli, _nearest_one(moduli))
         largest = float(moduli.max(initial=0.0))
         kind = "stable" if largest < 1.0 else "not stable"
-        self.words["orbit"] = (
-            f"Orbit of period {period} with {counted(len(orbit.signature), 'jump')}: "
-            f"largest multiplier {largest:.6g}, {kind}."
-        )
+        return f"period {period}, {counted(jumps, 'jump')}, largest multiplier {largest:.6g}, {kind}."
 
     def _draw_orbit(self, scene: Scene, orbit: PeriodicOrbit, arc: HybridArc) -> None:
         names = self.figures.states.shown
@@ -153,55 +180,53 @@ class Board:
         self.figures.section.show_orbit(points_of_orbit(self.subject, scene, orbit, arc, names))
         self.figures.multipliers.show(orbit)
 
-    def _clear_orbit(self) -> None:
-        self.orbit = None
-        self.figures.arc.show_orbit(None)
-        self.figures.section.show_orbit(())
-        self.figures.multipliers.show(None)
-
     def _show_branch(self, outcome: Outcome) -> None:
-        calls, status, branch = outcome.result
+        calls, branch = outcome.result
         self.calls["branch"], self.results["branch"] = calls, branch
         self.figures.diagram.show_branch(branch)
-        if branch is None:
-            self.words["branch"] = f"Branch: there is no orbit to follow. {status}"
-            return
         found = ", ".join(f"{each.kind} at {each.value:.6g}" for each in branch.bifurcations)
         ended = "" if branch.status.ok else f" {branch.status}"
-        self.words["branch"] = (
-            f"Branch of {counted(len(branch), 'orbit')}: {found or 'no bifurcation'}.{ended}"
-        )
+        self.words["branch"] = f"{counted(len(branch), 'orbit')}, {found or 'no bifurcation'}.{ended}"
 
     def _show_basins(self, outcome: Outcome) -> None:
-        scene, call, found = outcome.result
+        scene, call, found, mode = outcome.result
         self.calls["basins"], self.results["basins"] = (call,), found
         label = found.label.transpose(scene.up, scene.across).values
         self.figures.section.show_basins(label, found[scene.across].values, found[scene.up].values)
-        numbers, kinds = found.attractor.values.tolist(), found.kind.values.tolist()
-        told = ", ".join(f"{number} {kind}" for number, kind in zip(numbers, kinds, strict=True))
-        coming = "" if outcome.is_last else " A finer grid is being computed."
-        self.words["basins"] = f"Basins: {told or 'no attractor was found'}.{coming}"
+        said = [f"{_attractors(found.attractor.values.tolist(), found.kind.values.tolist())}."]
+        if mode:
+            said.append(
+                f"Several modes allow some of these starts: all are in mode {mode!r}. Choose another one "
+                "under 'Start'."
+            )
+        if not outcome.is_last:
+            said.append("A finer grid is being computed.")
+        self.words["basins"] = " ".join(said)
 
     def _show_diagram(self, outcome: Outcome) -> None:
         scene, chart = outcome.result
         if outcome.part == 0:
+            self.charts.clear()
             self.figures.diagram.begin()
             self.calls["diagram"] = (diagram_call(self.subject, scene),)
+        self.charts.append(chart)
         self.figures.diagram.add(scene.over, chart)
         self.progress = (outcome.part + 1) / len(outcome.job.parts)
-        # A column from beyond a guard reaches its end; what is said of it goes with the others.
-        early = chart.status.values != StatusCode.SUCCESS
-        failed = int(early.sum())
-        before = 0 if outcome.part == 0 else self.results.get("failed columns", 0)
-        self.results["failed columns"] = before + failed
-        if before + failed:
-            message = next((str(each) for each in chart.message.values[early] if str(each)), "")
-            self.results["why"] = message or self.results.get("why", "")
-            beyond = bool((chart.status.values[early] == StatusCode.START_BEYOND).any())
-            what = "ended early or began beyond a guard" if beyond else "ended early"
-            self.words["diagram"] = (
-                f"Diagram: {counted(before + failed, 'column')} {what}. {self.results['why']}"
-            )
+        self.words["diagram"] = remark(scene, self.charts)
+
+    def chart(self, scene: Scene) -> xarray.Dataset | None:
+        """The diagram as far as it has been computed; None if it has not begun."""
+        return joined(scene, self.charts) if self.charts else None
+
+
+def _attractors(numbers: list[int], kinds: list[str]) -> str:
+    """Each attractor with its kind, or how many there are of each kind."""
+    if not numbers:
+        return "no attractor was found"
+    if len(numbers) <= MOST_NAMED:
+        return ", ".join(f"{number} {kind}" for number, kind in zip(numbers, kinds, strict=True))
+    counts = ", ".join(f"{count} {kind}" for kind, count in Counter(kinds).items())
+    return f"{len(numbers)} attractors: {counts}"
 
 
 def _is_told(status: Status) -> bool:

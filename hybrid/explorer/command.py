@@ -7,12 +7,17 @@ import importlib
 import runpy
 import sys
 from collections.abc import Callable, Sequence
+from inspect import signature
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from hybrid.errors import ArgumentError, HybridError, unknown_name
 from hybrid.explorer.calls import OPENING
+from hybrid.explorer.faults import place_in_users_code, told
 from hybrid.system.graph import HybridSystem
+
+if TYPE_CHECKING:
+    from hybrid.explorer.subject import Subject
 
 Value = TypeVar("Value")
 WANTED = "MODULE:MODEL, such as models:vibroimpact or my_model.py:system"
@@ -36,31 +41,46 @@ def explore_model(given: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C; returns the exit status."""
     # The other commands run where the packages of the page are not installed, as when a wheel is built.
     from hybrid.explorer.explore import serve
-    from hybrid.explorer.subject import subject
+    from hybrid.explorer.source import Source
 
     try:
-        system, text = model_of(given.model)
-        start = _named("--start", given.start, _number)
-        unknown = [name for name in start if name not in system.state_names]
-        if unknown:
-            raise ArgumentError(
-                unknown_name("--start: component", unknown[0], system.state_names, "State components")
-            )
-        if start:
-            start = {**dict.fromkeys(system.state_names, 0.0), **start}
-        found = subject(
-            system,
-            text,
-            start or None,
-            mode=given.mode,
-            parameters=_named("--set", given.set, _number),
-            ranges=_named("--range", given.range, _range),
-        )
-        serve(found, port=given.port, address=given.address, block=True, show=not given.no_browser)
-    except HybridError as error:
-        print(f"hybrid: {error}", file=sys.stderr)
+        source = Source(_file_of(given.model), lambda: _subject_of(given))
+        serve(source, port=given.port, address=given.address, block=True, show=not given.no_browser)
+    except Exception as error:
+        if not isinstance(error, HybridError) and place_in_users_code(error) is None:
+            raise
+        print(f"hybrid: {told(error)}", file=sys.stderr)
         return 1
     return 0
+
+
+def _subject_of(given: argparse.Namespace) -> Subject:
+    """The model, and what the options say of it."""
+    from hybrid.explorer.subject import subject
+
+    system, text = model_of(given.model)
+    start = _named("--start", given.start, _number)
+    unknown = [name for name in start if name not in system.state_names]
+    if unknown:
+        raise ArgumentError(
+            unknown_name("--start: component", unknown[0], system.state_names, "State components")
+        )
+    if start:
+        start = {**dict.fromkeys(system.state_names, 0.0), **start}
+    return subject(
+        system,
+        text,
+        start or None,
+        mode=given.mode,
+        parameters=_named("--set", given.set, _number),
+        ranges=_named("--range", given.range, _range),
+    )
+
+
+def _file_of(given: str) -> Path | None:
+    """The file that ``FILE:MODEL`` names; None for a module, which Python reads once."""
+    name = given.rpartition(":")[0]
+    return Path(name) if name.endswith(".py") else None
 
 
 def model_of(given: str) -> tuple[HybridSystem, str]:
@@ -80,11 +100,12 @@ def model_of(given: str) -> tuple[HybridSystem, str]:
     if not callable(found):
         raise ArgumentError(f"{given} must be a HybridSystem or a factory of one; got {found!r}.")
     try:
-        system = found()
+        signature(found).bind()
     except TypeError as error:
         raise ArgumentError(
             f"{given}() does not run without arguments: {error}. Make the system in a module, and name that."
         ) from error
+    system = found()
     if not isinstance(system, HybridSystem):
         raise ArgumentError(f"{given}() must return a HybridSystem; got {type(system).__name__}.")
     return system, f"{opening}\nsystem = {name}()\n"
@@ -94,6 +115,9 @@ def _from_module(module: str, name: str) -> tuple[Any, str]:
     try:
         loaded = importlib.import_module(module)
     except ModuleNotFoundError as error:
+        if error.name is None or not f"{module}.".startswith(f"{error.name}."):
+            # The module is there, and one that it imports is not.
+            raise
         raise ArgumentError(f"Module {module!r} was not found ({error}). Name {WANTED}.") from error
     return _member(module, name, vars(loaded)), f"{OPENING}\nfrom {module} import {name}\n"
 

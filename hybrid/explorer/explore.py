@@ -10,7 +10,8 @@ from typing import Any
 from hybrid import arguments
 from hybrid.errors import HybridError
 from hybrid.explorer.calls import OPENING
-from hybrid.explorer.subject import Subject, subject
+from hybrid.explorer.source import Subjects
+from hybrid.explorer.subject import subject
 from hybrid.simulation.extra import how_to_install
 from hybrid.system.graph import HybridSystem
 
@@ -88,18 +89,18 @@ def explore(
         If Panel is not installed.
     """
     found = subject(system, OPENING + "\n" + THE_SYSTEM, x0, mode=mode, parameters=parameters, ranges=ranges)
-    return serve(found, port=port, address=address, block=block, show=show)
+    return serve(lambda: (found, ""), port=port, address=address, block=block, show=show)
 
 
 def serve(
-    found: Subject,
+    subjects: Subjects,
     *,
     port: int = 0,
     address: str = "localhost",
     block: bool | None = None,
     show: bool | None = None,
 ) -> Explorer:
-    """Serve the page of a subject; as :func:`explore`."""
+    """Serve the page of the model that ``subjects`` gives whenever a page is opened; as :func:`explore`."""
     port = arguments.count("port", port, 0, 65535)
     arguments.instance("address", address, str, "Name the address of this machine to listen at.")
     block = _waits() if block is None else arguments.flag("block", block)
@@ -108,7 +109,7 @@ def serve(
         from hybrid.explorer.server import started
     except ImportError as error:
         raise HybridError(INSTALL) from error
-    server, url = started(found, port, address)
+    server, url = started(subjects, port, address)
     if address not in LOCAL:
         print(
             f"hybrid: the page listens at {address}; whoever reaches that address can use it.",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from io import BytesIO
 from threading import Event
 from typing import Any
 
@@ -11,19 +12,14 @@ import panel as pn
 
 from hybrid.errors import ArgumentError, HybridError
 from hybrid.explorer.board import Board
+from hybrid.explorer.diagrams import NO_PARAMETER, diagram_job
 from hybrid.explorer.events import described_jump
 from hybrid.explorer.figures.all import Figures
 from hybrid.explorer.layout import arranged
-from hybrid.explorer.pictures import (
-    Live,
-    basins_job,
-    branch_job,
-    changed,
-    diagram_job,
-    exponents_job,
-    live_job,
-    orbit_job,
-)
+from hybrid.explorer.messages import COMING
+from hybrid.explorer.orbits import Finder, branch_job, orbit_job
+from hybrid.explorer.painted import basins_job
+from hybrid.explorer.pictures import Live, changed, exponents_job, live_job
 from hybrid.explorer.saved import saved_figure
 from hybrid.explorer.scene import checks_of, from_query, over_parameter, to_query
 from hybrid.explorer.subject import Subject
@@ -48,17 +44,22 @@ class Page:
         Parts of the address that the page was opened with.
     execute
         Runs a function in the thread of the page; called from the thread of the worker.
+    problem
+        Why the page does not show what the user's file holds now; empty if it does.
     """
 
     def __init__(
-        self, subject: Subject, query: dict[str, str], execute: Callable[[Callable[[], None]], Any]
+        self,
+        subject: Subject,
+        query: dict[str, str],
+        execute: Callable[[Callable[[], None]], Any],
+        problem: str = "",
     ) -> None:
         self.subject, self.execute = subject, execute
         self.scene, refused = from_query(subject, query)
         self.board = Board(subject, Figures(subject.system))
-        self.board.words["address"] = " ".join(refused)
-        # The last section and arc, as the worker knows them: before they are shown.
-        self.latest: Live | None = None
+        self.board.words |= {"file": problem, "address": " ".join(refused)}
+        self.finder = Finder(subject)
         self.jump, self.frame, self.seconds = -1, 0, 0.0
         figures = self.board.figures
         self.board.choose(self.scene)
@@ -68,7 +69,7 @@ class Page:
         for made in (figures.diagram.above, figures.diagram.below):
             made.on_event("tap", lambda event: self.move(self.scene.over, event.x))
         self.worker = Worker(self._have_shown)
-        self.view = arranged(subject.system.name or "Hybrid system", self.widgets, figures)
+        self.view = arranged(subject.title, self.widgets, figures)
         self.refresh()
 
     def close(self, *, wait: bool = True) -> None:
@@ -101,9 +102,10 @@ class Page:
         if "over" in changed:
             scene = over_parameter(self.subject, scene, scene.over)
         self.scene = scene
-        if not scene.low < scene.high:
-            # One end is typed before the other: the diagram waits until both are there.
-            self.say("address", f"The diagram needs from < to; got {scene.low:g} and {scene.high:g}.")
+        # One end is typed before the other: the diagram waits until both are there.
+        waits = not scene.low < scene.high
+        ends = f"it needs from < to; got {scene.low:g} and {scene.high:g}."
+        self.board.words["range"] = ends if waits else ""
         self.board.choose(scene)
         self.refresh()
 
@@ -143,6 +145,7 @@ class Page:
     def reset(self) -> None:
         """Return to the first scene."""
         self.scene, _ = from_query(self.subject, {})
+        self.board.words |= {"address": "", "range": ""}
         self.board.choose(self.scene)
         self.refresh()
 
@@ -159,15 +162,15 @@ class Page:
         if not on:
             self.board.clear(picture)
             self.worker.forget(picture)
-            self.say(picture, "")
         self.refresh()
 
     def step(self, by: int) -> None:
         """Go to the next jump of the arc, or to one before."""
         live = self.board.live
         if live is None or not live.arc.jump_count:
-            self.widgets.event.object = "<p>The arc has no jumps.</p>"
+            self.say("jumps", "The arc has no jumps.")
             return
+        self.say("jumps", "")
         self.jump = int(np.clip(self.jump + by, 0, live.arc.jump_count - 1))
         jump = live.arc.jumps[self.jump]
         names = self.board.figures.states.shown
@@ -198,26 +201,31 @@ class Page:
     def refresh(self) -> None:
         """Have everything computed that the scene shows and that is not there yet."""
         subject, scene, on = self.subject, self.scene, self.widgets.switched_on
-        jobs = [live_job(subject, scene, self._keep)]
+        jobs = [live_job(subject, scene, self.finder.keep)]
         if "orbit" in on:
-            jobs.append(orbit_job(subject, scene, self._last))
+            jobs.append(orbit_job(self.finder, scene))
         jobs.append(exponents_job(subject, scene))
         has_range = bool(scene.over) and scene.low < scene.high
         if has_range and "branch" in on:
-            jobs.append(branch_job(subject, scene, self._last))
+            jobs.append(branch_job(self.finder, scene))
         if "basins" in on and self.board.live is not None:
             # Before the diagram, which takes longest; a drag does not wait for either.
-            jobs.append(basins_job(subject, scene, *self.board.figures.section.plane))
+            mode = scene.mode or str(self.board.live.arc.part_of[0])
+            jobs.append(basins_job(subject, scene, mode, *self.board.figures.section.plane))
         if has_range:
             jobs.append(diagram_job(subject, scene))
+        self._announce([each.picture for each in jobs])
+        self.widgets.say(self.board.words)
         self.worker.want(jobs)
 
-    def _keep(self, live: Live) -> None:
-        self.latest = live
-
-    def _last(self) -> Live:
-        assert self.latest is not None
-        return self.latest
+    def _announce(self, pictures: Sequence[str]) -> None:
+        """Say of the diagram, and of what is switched on, that it is not there yet or cannot be."""
+        words = self.board.words
+        for picture in (*self.widgets.switches, "diagram"):
+            if picture in pictures and picture not in self.board.calls and not words.get(picture):
+                words[picture] = COMING
+        if not self.scene.over:
+            words["diagram"] = NO_PARAMETER
 
     def _have_shown(self, outcome: Outcome) -> None:
         """Have a result shown, and wait until it is: further work would only slow down what is looked at."""
@@ -240,6 +248,8 @@ class Page:
         if picture in self.widgets.switches and picture not in self.widgets.switched_on:
             return
         self.board.show(outcome)
+        if picture == "live":
+            self.board.words["jumps"] = ""
         self.widgets.say(self.board.words)
         self.widgets.follow(self.scene)
         if self.scene.over:
@@ -249,7 +259,7 @@ class Page:
             return
         # What follows can wait until the drag is over.
         if self.board.live is not None:
-            self.widgets.tell_speed(len(self.board.live.points.x), self.seconds)
+            self.board.figures.section.tell_speed(self.seconds)
         self.widgets.show_script(self.script())
         self.widgets.progress.value = round(100 * self.board.progress)
 
@@ -262,10 +272,13 @@ class Page:
         """Python that computes and draws what the page shows."""
         return self.board.script(self.scene)
 
-    def saved(self, picture: str, suffix: str) -> Any:
-        """A picture as a file, drawn by the functions that the script names."""
+    def saved(self, picture: str, suffix: str) -> BytesIO | None:
+        """A picture as a file, drawn by the functions that the script names; None if there is none yet."""
+        results = {**self.board.results, "diagram": self.board.chart(self.scene)}
         try:
-            return saved_figure(self.scene, picture, suffix, self.board.live, self.board.results)
+            file = saved_figure(self.scene, picture, suffix, self.board.live, results)
         except HybridError as error:
             self.say("saved", str(error))
-            raise
+            return None
+        self.say("saved", "")
+        return file

@@ -41,7 +41,8 @@ class Scene:
     over, low, high, columns
         Parameter of the diagram, its ends, and the number of values.
     periods
-        Forcing periods of the orbit that is looked for.
+        Forcing periods of the orbit that is looked for, or points of the section of an unforced system; 0:
+        as many as the section has dots.
     """
 
     values: Mapping[str, float]
@@ -60,7 +61,7 @@ class Scene:
     transient: int = 200
     window: float = 10.0
     columns: int = 300
-    periods: int = 1
+    periods: int = 0
 
     def with_(self, **changed: Any) -> Scene:
         """The scene with other values."""
@@ -173,7 +174,7 @@ def checks_of(subject: Subject) -> dict[str, Check]:
         "transient": _count(0, MOST_POINTS),
         "window": _up_to(MOST_UNITS),
         "columns": _count(2, MOST_VALUES),
-        "periods": _count(1, 1000),
+        "periods": _count(0, 1000),
     }
 
 

@@ -48,6 +48,11 @@ class Subject:
     values: Mapping[str, float]
     ranges: Mapping[str, tuple[float, float]]
 
+    @property
+    def title(self) -> str:
+        """The name of the model."""
+        return self.system.name or "Hybrid system"
+
     @cached_property
     def is_forced(self) -> bool:
         """Whether the system declares a forcing period."""
@@ -136,5 +141,17 @@ def _found_start(
         if best is not None and best[0] == 7.0:
             break
     if best is None:
-        raise ArgumentError("No start was found from which the system runs. Give one with x0=.")
+        raise _no_start(system, values, mode)
     return best[1], best[2]
+
+
+def _no_start(system: HybridSystem, values: Mapping[str, float], mode: str | None) -> ArgumentError:
+    """The error where no start runs, with that of a run from rest as its cause: a model may be at fault."""
+    text = "No start was found from which the system runs. Give one with x0=."
+    try:
+        simulate(system, np.zeros(system.dimension), (0.0, 0.0), mode=mode, parameters=values)
+    except HybridError as error:
+        found = ArgumentError(f"{text} From rest: {error}")
+        found.__cause__ = error
+        return found
+    return ArgumentError(text)

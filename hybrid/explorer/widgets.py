@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Callable, Mapping
 from functools import partial
 from html import escape
-from io import StringIO
+from io import BytesIO, StringIO
 from math import isfinite
 from typing import Any, Protocol
 
 import panel as pn
-from bokeh.models import NumericInput, Slider
+from bokeh.models import CustomJS, Div, NumericInput, Slider
 
 from hybrid.display.tables import with_unit
-from hybrid.explorer.saved import FORMATS, PICTURES
+from hybrid.explorer.messages import PLACES, placed
+from hybrid.explorer.saved import FORMATS, PICTURES, file_name
 from hybrid.explorer.scene import BEGIN, SETTLED, Scene, section_names
 from hybrid.explorer.subject import Subject
 
 WIDE = {"sizing_mode": "stretch_width"}
+# What stands in the bar of buttons, which leaves the room of the page to the pictures.
+SMALL = {"margin": (2, 4)}
 # Milliseconds between two frames of the moving point.
 FRAME = 50
+SAID = "p { margin: 2px 0; color: #7a2e00; font-size: 14px; overflow-wrap: anywhere; }"
+DOWNLOAD = """
+    const link = document.createElement("a");
+    [link.download, link.href] = sent.tags;
+    link.click();
+"""
 
 
 class Acts(Protocol):
@@ -57,8 +67,8 @@ class Acts(Protocol):
         """The script of what is shown."""
         ...
 
-    def saved(self, picture: str, suffix: str) -> Any:
-        """A picture as a file."""
+    def saved(self, picture: str, suffix: str) -> BytesIO | None:
+        """A picture as a file; None if there is none."""
 
 
 class Widgets:
@@ -72,11 +82,15 @@ class Widgets:
         What else a scene has, by the names of its fields.
     switches
         Orbit, branch and basins, which are on or off.
+    messages
+        What is said, by place.
+    sent
+        Carries files to the browser, which saves them.
     """
 
     def __init__(self, subject: Subject, scene: Scene, acts: Acts) -> None:
         self.subject, self.acts = subject, acts
-        self.following = False
+        self.following, self.files = False, 0
         units, names = subject.system.units, list(subject.system.quantity_names)
         self.sliders: dict[str, Any] = {}
         self.fields: dict[str, Any] = {}
@@ -93,32 +107,30 @@ class Widgets:
         for name, each in self.choices.items():
             self._when(each, partial(self._change, name))
         labels = {"orbit": "Orbit near here", "branch": "Its branch", "basins": "Basins"}
-        self.switches = {name: pn.widgets.Toggle(label=label) for name, label in labels.items()}
+        self.switches = {name: pn.widgets.Toggle(label=label, **SMALL) for name, label in labels.items()}
         for name, each in self.switches.items():
             self._when(each, partial(acts.switched, name))
-        self.held = pn.widgets.Toggle(label="Hold to compare")
+        self.held = pn.widgets.Toggle(label="Hold to compare", **SMALL)
         self._when(self.held, acts.hold)
         self.back = self._button("Previous jump", lambda: acts.step(-1))
         self.next = self._button("Next jump", lambda: acts.step(1))
-        self.play = pn.widgets.Toggle(label="Play")
+        self.play = pn.widgets.Toggle(label="Play", **SMALL)
         self._when(self.play, self._play)
         self._ticks: Any = None
         self.start_again = self._button("Reset", acts.reset)
         self.share = self._button("Share", self._share)
-        self.words = pn.pane.HTML("", **WIDE)
-        self.speed = pn.pane.HTML("")
+        self.messages = {place: _message(place) for place in PLACES}
         self.event = pn.pane.HTML("", **WIDE)
         self.script = pn.pane.HTML("", **WIDE)
         self.progress = pn.indicators.Progress(value=0, max=100, height=6, **WIDE)
         self.save_script = pn.widgets.FileDownload(
-            callback=lambda: StringIO(acts.script()), filename="explored.py", label="Save the script"
+            callback=lambda: StringIO(acts.script()), filename="explored.py", label="Save the script", **SMALL
         )
-        self.picture = pn.widgets.Select(label="picture", options=list(PICTURES), width=130)
-        self.format = pn.widgets.Select(label="format", options=list(FORMATS), width=80)
-        self.save_picture = pn.widgets.FileDownload(
-            callback=self._saved, filename="picture.png", label="Save the picture"
-        )
-        self._when(self.format, lambda value: setattr(self.save_picture, "filename", f"picture.{value}"))
+        self.picture = pn.widgets.Select(label="picture", options=list(PICTURES), **{**SMALL, "width": 120})
+        self.format = pn.widgets.Select(label="format", options=list(FORMATS), **{**SMALL, "width": 75})
+        self.save_picture = self._button("Save the picture", self._save)
+        self.sent = Div(visible=False, name="sent")
+        self.sent.js_on_change("tags", CustomJS(args={"sent": self.sent}, code=DOWNLOAD))
 
     @property
     def switched_on(self) -> list[str]:
@@ -141,14 +153,13 @@ class Widgets:
             self.following = False
 
     def say(self, words: Mapping[str, str]) -> None:
-        """Show what is said about the pictures."""
-        told = "".join(f"<p>{escape(each)}</p>" for each in words.values() if each)
-        # A reader of the screen reads it when it changes.
-        _show(self.words, f'<div role="status" aria-live="polite">{told}</div>')
-
-    def tell_speed(self, points: int, seconds: float) -> None:
-        """Say how long the last run took."""
-        _show(self.speed, f"{points} points in {1000 * seconds:.0f} ms")
+        """Show what is said, each sentence in its place."""
+        for place, sentences in placed(words).items():
+            told = "".join(f"<p>{escape(each)}</p>" for each in sentences)
+            # A reader of the screen reads it when it changes.
+            text = f'<div role="status" aria-live="polite">{told}</div>'
+            if self.messages[place].text != text:
+                self.messages[place].text = text
 
     def show_script(self, text: str) -> None:
         """Show the script."""
@@ -212,7 +223,7 @@ class Widgets:
             "low": ("from", None),
             "high": ("to", None),
             "columns": ("columns", 2),
-            "periods": ("periods of the orbit", 1),
+            "periods": ("periods (0: by dots)", 0),
         }
         made = {}
         for field, (label, kind) in kinds.items():
@@ -227,7 +238,7 @@ class Widgets:
         return made
 
     def _button(self, label: str, act: Callable[[], None]) -> Any:
-        return pn.widgets.Button(label=label, on_click=lambda _: act())
+        return pn.widgets.Button(label=label, on_click=lambda _: act(), **SMALL)
 
     def _play(self, on: bool) -> None:
         if on:
@@ -235,14 +246,26 @@ class Widgets:
         elif self._ticks is not None:
             self._ticks.stop()
 
-    def _saved(self) -> Any:
-        return self.acts.saved(self.picture.value, self.format.value)
+    def _save(self) -> None:
+        picture, suffix = self.picture.value, self.format.value
+        file = self.acts.saved(picture, suffix)
+        if file is not None:
+            data = b64encode(file.read()).decode()
+            # The number tells a file from the same file, saved again.
+            self.files += 1
+            name = file_name(self.subject.title, picture, suffix)
+            self.sent.tags = [name, f"data:application/octet-stream;base64,{data}", self.files]
 
     def _share(self) -> None:
         location = pn.state.location
         if location is not None:
             location.search = ""
             location.update_query(**self.acts.shared())
+
+
+def _message(place: str) -> Div:
+    """An empty message; a text of it is never read as mathematics."""
+    return Div(name=f"said {place}", stylesheets=[SAID], margin=(0, 5), disable_math=True, **WIDE)
 
 
 def _put(widget: Any, value: Any) -> None:

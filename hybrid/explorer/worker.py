@@ -12,6 +12,7 @@ import attrs
 
 from hybrid.compiler.interrupts import stopped_by
 from hybrid.errors import HybridError
+from hybrid.explorer.faults import told
 
 # Seconds after which a part is told to end with what it has, and after which it gives way to a newer job for
 # the same picture. Before that it is shown, so that a picture moves while a slider does.
@@ -33,11 +34,14 @@ class Job:
         What the result depends on: a job with the key of the last one is not done again.
     parts
         Functions to call one after the other; the page shows the result of each.
+    attempt
+        What decides besides whether the job can be done: one that failed is done again when this changes.
     """
 
     picture: str
     key: Hashable
     parts: Sequence[Callable[[], Any]]
+    attempt: Hashable = None
 
 
 @attrs.frozen(eq=False)
@@ -69,8 +73,8 @@ class Worker:
         self.show = show
         self.wanted: list[Job] = []
         self.asked = 0.0
-        # By picture: the key of the last job, and how many of its parts are done.
-        self.done: dict[str, tuple[Hashable, int]] = {}
+        # By picture: the last job, how many of its parts are done, and whether it failed.
+        self.done: dict[str, tuple[Job, int, bool]] = {}
         self.current: Job | None = None
         # Whether the part that is computed is no longer wanted.
         self.superseded = False
@@ -120,11 +124,16 @@ class Worker:
 
     def _next(self) -> Job | None:
         """The first job that has parts left."""
-        for job in self.wanted:
-            key, parts = self.done.get(job.picture, (None, 0))
-            if key != job.key or parts < len(job.parts):
-                return job
-        return None
+        return next((job for job in self.wanted if self._parts_done(job) < len(job.parts)), None)
+
+    def _parts_done(self, job: Job) -> int:
+        """How many parts of a job need not be done again; all of a job that would fail as it has."""
+        last, parts, failed = self.done.get(job.picture, (None, 0, False))
+        if last is None or last.key != job.key:
+            return 0
+        if failed:
+            return len(job.parts) if last.attempt == job.attempt else 0
+        return parts
 
     def _awaited(self) -> Job | None:
         """The next job, as soon as its turn has come; None when the worker is closed."""
@@ -147,8 +156,7 @@ class Worker:
                 self.current = job
                 self.stop.clear()
                 self.superseded = False
-                key, part = self.done.get(job.picture, (None, 0))
-                part = part if key == job.key else 0
+                part = self._parts_done(job)
             outcome = self._outcome(job, part)
             with self.changed:
                 if self.closed:
@@ -156,7 +164,7 @@ class Worker:
                 # A part that was told to end for another job is done again when its turn comes.
                 if self.superseded:
                     continue
-                self.done[job.picture] = (job.key, len(job.parts) if outcome.problem else part + 1)
+                self.done[job.picture] = (job, part + 1, bool(outcome.problem))
             self.show(outcome)
 
     def _outcome(self, job: Job, part: int) -> Outcome:
@@ -167,11 +175,10 @@ class Worker:
         try:
             with stopped_by(self.stop):
                 result = job.parts[part]()
-        except HybridError as error:
-            problem = str(error)
         except Exception as error:  # a fault in a user's function must not end the page
-            traceback.print_exc()
-            problem = f"{type(error).__name__}: {error}"
+            problem = told(error)
+            if not isinstance(error, HybridError):
+                traceback.print_exc()
         finally:
             late.cancel()
         return Outcome(job, part, result, problem, perf_counter() - begin)

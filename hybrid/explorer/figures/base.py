@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from bokeh.models import ColumnDataSource, Range1d, Span
+from bokeh.models import ColumnDataSource, CustomLabelingPolicy, Range1d, Span
 from bokeh.plotting import figure
 
 from hybrid.system.graph import HybridSystem
@@ -13,6 +13,16 @@ from hybrid.system.graph import HybridSystem
 TOOLS = "pan,box_zoom,wheel_zoom,reset,save"
 # A range is this share wider than what it shows, and becomes narrower when so little of it is used.
 MARGIN, LEAST_USED = 0.06, 0.5
+# Pixels between the labels of two ticks.
+LABELS_APART = 8
+# Every second label of an axis is left out, or two of three, and so on, until none runs into the next one.
+EVERY_OTHER = """
+    const all = [...indices];
+    const near = (step) => all.some((each, i) => i >= step && distance(all[i - step], each) < apart);
+    let step = 1;
+    while (step < all.length && near(step)) step += 1;
+    return all.filter((_, i) => i % step === 0);
+"""
 HELD, JUMP, ORBIT, START = "#B0B0B0", "#595959", "#000000", "#000000"
 
 
@@ -31,6 +41,7 @@ def blank(title: str, name: str, height: int, **options: Any) -> Any:
     made.toolbar.logo = None
     made.toolbar.autohide = True
     made.grid.grid_line_alpha = 0.4
+    made.axis.major_label_policy = CustomLabelingPolicy(args={"apart": LABELS_APART}, code=EVERY_OTHER)
     return made
 
 

@@ -103,7 +103,9 @@ class DiagramFigures:
         empty(self.points, self.largest)
 
     def add(self, name: str, chart: Any) -> None:
-        """Add columns from a chart over the parameter."""
+        """Add columns from a chart over the parameter; one in which every column failed has none."""
+        if "section" not in chart:
+            return
         values, points = chart[name].values, chart.section.values
         flat = points.reshape(-1, points.shape[2])
         told = np.isfinite(flat).all(axis=1)

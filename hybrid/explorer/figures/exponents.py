@@ -48,6 +48,10 @@ class ExponentsFigure:
             "text": [f"{v:.6g} ± {e:.2g}" for v, e in zip(values, error, strict=True)],
         }
 
+    def clear(self) -> None:
+        """Take the exponents away."""
+        empty(self.values)
+
 
 class MultipliersFigure:
     """Multipliers of an orbit in the complex plane.
@@ -63,8 +67,8 @@ class MultipliersFigure:
         self.made = blank(
             "Multipliers", "multipliers", 330, x_range=Range1d(-1.5, 1.5), y_range=Range1d(-1.5, 1.5)
         )
-        # A circle must look like one.
-        self.made.sizing_mode, self.made.width = "fixed", 340
+        # A circle must look like one, in a narrow column too.
+        self.made.sizing_mode, self.made.width, self.made.max_width = "scale_width", 340, 340
         self.made.ellipse(0.0, 0.0, 2.0, 2.0, fill_alpha=0.0, line_color=JUMP)
         self.made.scatter("re", "im", source=self.values, size=10, marker="x", line_width=2, color=COLOURS[1])
         self.made.add_tools(HoverTool(tooltips=[("multiplier", "@text")]))

@@ -96,6 +96,10 @@ class SectionFigure:
             self.extent = np.array([low - lacking, high + lacking])
             self._fit()
 
+    def tell_speed(self, seconds: float) -> None:
+        """Say in the title how many points there are, and how long the run took."""
+        self.made.title.text = f"Section: {len(self.points.data['t'])} points, {1000 * seconds:.0f} ms"
+
     def hold(self, held: bool) -> None:
         """Keep what is drawn, in grey, to compare with; or let it go."""
         if held:

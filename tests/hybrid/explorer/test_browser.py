@@ -116,6 +116,114 @@ def assert_fits(page, width):
     assert run(page, "return document.documentElement.scrollWidth") <= width + 1
 
 
+# Texts that the browser draws into the canvases of the figures, with the rectangles that they fill.
+TEXTS = """
+const done = arguments[arguments.length - 1];
+const drawn = new Map(), context = CanvasRenderingContext2D.prototype;
+const plain = context.fillText, clear = context.clearRect;
+context.clearRect = function (...given) {
+    drawn.delete(this.canvas);
+    return clear.apply(this, given);
+};
+context.fillText = function (text, x, y, ...rest) {
+    const size = this.measureText(text), at = this.getTransform();
+    if (at.b === 0) {
+        const corner = (dx, dy) => [at.a * (x + dx) + at.e, at.d * (y + dy) + at.f];
+        const [left, top] = corner(-size.actualBoundingBoxLeft, -size.actualBoundingBoxAscent);
+        const [right, bottom] = corner(size.actualBoundingBoxRight, size.actualBoundingBoxDescent);
+        if (!drawn.has(this.canvas)) drawn.set(this.canvas, new Map());
+        drawn.get(this.canvas).set(`${text} ${left} ${top}`, [text, left, top, right, bottom]);
+    }
+    return plain.call(this, text, x, y, ...rest);
+};
+for (const name of arguments[0]) Bokeh.index.find_one_by_id(figure(name).id).request_paint();
+setTimeout(() => {
+    context.fillText = plain;
+    context.clearRect = clear;
+    done([...drawn.values()].map((each) => [...each.values()]));
+}, 500);
+"""
+BUTTONS = (
+    *("Orbit near here", "Its branch", "Basins", "Hold to compare", "Reset", "Share"),
+    *("Previous jump", "Play", "Next jump", "Save the picture", "Copy the script", "Save the script"),
+)
+FIGURES = ["portrait", "section", "series", "exponents", "diagram", "largest", "multipliers"]
+
+
+def assert_texts_are_apart(page):
+    """No label of an axis runs into another text of its figure, once all figures have their contents."""
+    wait(page, "return models.some((each) => each.type.endsWith('Progress') && each.value === 100)", 120)
+    figures = page.execute_async_script(TOOLS + TEXTS, FIGURES)
+    assert len(figures) == len(FIGURES)
+    for texts in figures:
+        assert len(texts) > 4
+        for i, (one, *a) in enumerate(texts):
+            for other, *b in texts[i + 1 :]:
+                meet = a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+                assert not meet, (one, other)
+
+
+def resize(page, width, height, mobile=False):
+    """Give the page a window of this size."""
+    page.execute_cdp_cmd(
+        "Emulation.setDeviceMetricsOverride",
+        {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": mobile},
+    )
+
+
+def test_buttons_are_in_view_and_labels_apart_in_a_small_window(page):
+    """Also when the page is scrolled: the bar of the buttons stays."""
+    resize(page, 900, 900)
+    places = """return all(document, "button, a.bk-btn", []).map((each) => {
+        const box = each.getBoundingClientRect();
+        return [each.textContent.trim(), box.left, box.top, box.right, box.bottom, box.width];
+    })"""
+    for scrolled in (0, 700):
+        page.execute_script("window.scrollTo(0, arguments[0])", scrolled)
+        time.sleep(0.2)
+        found = {text: box for text, *box in run(page, places)}
+        assert set(BUTTONS) <= set(found)
+        for left, top, right, bottom, width in map(found.get, BUTTONS):
+            assert width > 0
+            assert min(left, top) >= 0
+            assert max(right, bottom) <= 900
+    assert page.execute_script("return window.scrollY") > 0
+    page.execute_script("window.scrollTo(0, 0)")
+    assert_fits(page, 900)
+    assert_texts_are_apart(page)
+    page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_one_cause_is_told_once_and_in_the_page(page):
+    """A parameter that cannot be spoils all pictures, and the page says so in one sentence."""
+    before = run(page, "return slider('omega (').value")
+    run(page, "slider('omega (').value = 0.0")
+    told = """return all(document, '[role=status]', []).map((each) => each.textContent)
+        .filter((each) => each.includes('period must be finite'))"""
+    wait(page, f"const told = (() => {{ {told} }})(); return told.some((each) => each.includes('exponents'))")
+    assert len(run(page, told)) == 1
+    assert run(page, told)[0].count("period must be finite") == 1
+    assert run(page, "return Bokeh.documents[0].config.notify_connection_status") is False
+    run(page, "slider('omega (').value = arguments[0]", before)
+    wait(page, "return points().data.x0.length === 2000 && slider('omega (').value > 7")
+    wait(page, f"return (() => {{ {told} }})().length === 0")
+
+
+def test_a_picture_is_saved_under_the_name_of_the_model(page, tmp_path):
+    page.execute_cdp_cmd("Page.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
+    choose = """const select = all(document, "select", [])
+        .find((each) => [...each.options].some((option) => option.text === "time series"));
+    select.value = [...select.options].find((option) => option.text === "diagram").value;
+    select.dispatchEvent(new Event("change"));"""
+    run(page, choose)
+    time.sleep(0.5)
+    run(page, "button('Save the picture').click()")
+    file, end = tmp_path / "vibro-impact_diagram.png", time.monotonic() + 30
+    while not file.exists() and time.monotonic() < end:
+        time.sleep(0.1)
+    assert file.read_bytes()[:4] == b"\x89PNG"
+
+
 def test_the_script_runs_and_gives_the_same_numbers(page):
     run(page, "button('Orbit near here').click()")
     text = wait(page, "const text = script(); return text && text.includes('orbit = ') ? text : null")
@@ -224,10 +332,23 @@ def test_share_puts_the_scene_into_the_address(page):
 
 def test_nothing_is_cut_off_on_a_telephone(page):
     width = 390
-    page.execute_cdp_cmd(
-        "Emulation.setDeviceMetricsOverride",
-        {"width": width, "height": 2000, "deviceScaleFactor": 1, "mobile": True},
-    )
+    resize(page, width, 2000, mobile=True)
     page.refresh()
     wait(page, "return points() && points().data.x0.length === 2000")
     assert_fits(page, width)
+    assert_texts_are_apart(page)
+
+
+def test_a_lost_connection_is_told_in_the_page(page, explorer):
+    """The last test, since the page is lost then: Bokeh itself would tell it over the page."""
+    keep = """const plain = WebSocket;
+        window.opened = [];
+        window.WebSocket = class extends plain {
+            constructor(...given) { super(...given); window.opened.push(this); }
+        };"""
+    page.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": keep})
+    page.get(explorer.url)
+    wait(page, "return points() && points().data.x0.length === 2000")
+    page.execute_script("window.opened.forEach((each) => each.close())")
+    wait(page, "return figure('said top').text.includes('The program behind this page has ended')")
+    assert run(page, "return Bokeh.documents[0].config.notify_connection_status") is False

@@ -1,6 +1,5 @@
 """The page without a browser: what is shown, what is said, and the script that gives the same."""
 
-import attrs
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -13,20 +12,9 @@ import models
 from hybrid import Guard, HybridSystem, Mode, Reset, Transition, from_equations
 from hybrid.errors import ArgumentError
 from hybrid.explorer.page import Page
-from hybrid.explorer.pictures import diagram_call
 from hybrid.explorer.subject import subject
-from hybrid.explorer.worker import Job, Outcome
-from hybrid.status import StatusCode
+from tests.hybrid.explorer.pages import FALL, RELAY, said
 from tests.hybrid.transform.contacts.scenes import block
-
-IMPORTS = "import hybrid\nimport lyapunov\nimport matplotlib.pyplot as plt\nimport numpy as np\n\n"
-
-
-def page_of(factory, *, query=None, **options):
-    text = f"{IMPORTS}from models import {factory.__name__}\n\nsystem = {factory.__name__}()\n"
-    page = Page(subject(factory(), text, **options), {"columns": "12", **(query or {})}, lambda act: act())
-    assert page.worker.wait(120)
-    return page
 
 
 def run(script):
@@ -34,19 +22,6 @@ def run(script):
     exec(compile(script, "explored.py", "exec"), made)
     plt.close("all")
     return made
-
-
-@pytest.fixture
-def opened(request):
-    pages = []
-
-    def make(*arguments, **options):
-        pages.append(page_of(*arguments, **options))
-        return pages[-1]
-
-    yield make
-    for page in pages:
-        page.close()
 
 
 # A parameter may be declared at the end of its range, as a restitution of 1.
@@ -194,18 +169,18 @@ def test_the_point_runs_along_the_arc(opened):
 
 def test_what_ends_early_is_said(opened):
     page = opened(models.bouncing_ball, x0=(1.0, 0.0))
-    assert "ACCUMULATION" in page.widgets.words.object
-    assert "accumulates_to" in page.widgets.words.object
+    assert "ACCUMULATION" in said(page)
+    assert "accumulates_to" in said(page)
 
 
 def test_a_parameter_that_cannot_be_is_said_and_the_page_lives(opened):
     page = opened(models.impact_oscillator)
     page.move("w", 0.0)
     assert page.worker.wait(60)
-    assert "period" in page.widgets.words.object
+    assert "period" in said(page)
     page.move("w", 1.0)
     assert page.worker.wait(60)
-    assert page.board.words["live"] == ""
+    assert page.board.words["portrait"] == page.board.words["section"] == ""
 
 
 def test_hold_and_let_go(opened):
@@ -231,126 +206,28 @@ def test_a_shared_address_opens_the_same_page(opened):
     assert again.scene.values["w"] == 1.0
 
 
-@pytest.mark.parametrize("suffix", ["png", "svg"])
-def test_pictures_are_saved(opened, suffix):
-    page = opened(models.impact_oscillator)
-    for picture in ("portrait", "section", "time series", "exponents"):
-        file = page.saved(picture, suffix).read()
-        assert file[:4] == b"\x89PNG" if suffix == "png" else b"<svg" in file
-    with pytest.raises(ArgumentError, match="nothing has been drawn of 'orbit' yet"):
-        page.saved("orbit", suffix)
-    assert "nothing has been drawn" in page.widgets.words.object
-
-
-def test_the_diagram_keeps_while_its_parameter_moves(opened):
-    page = opened(models.impact_oscillator)
-    before = list(page.board.figures.diagram.points.data["parameter"])
-    page.move("w", 1.1)
+def test_one_cause_is_said_once(opened):
+    """All pictures end with the jumps that accumulate, and one sentence says so."""
+    page = opened(models.bouncing_ball, x0=(1.0, 0.0))
+    top = page.widgets.messages["top"].text
+    assert "Portrait, section and exponents: ACCUMULATION" in top
+    assert said(page).count("ACCUMULATION") == 1
+    for switch in ("orbit", "branch"):
+        page.widgets.switches[switch].value = True
+    page.move("e", -1e300)
     assert page.worker.wait(60)
-    assert list(page.board.figures.diagram.points.data["parameter"]) == before
-    page.move("c", 0.11)
+    sentences = [each for each in said(page).replace("</p>", "<p>").split("<p>") if each.strip()[:1] != "<"]
+    assert len(sentences) == len(set(sentences))
+
+
+def test_what_follows_the_section_ends_as_it_does(opened):
+    page = opened(models.impact_oscillator, query={"p.w": "0"})
+    for switch in ("orbit", "branch"):
+        page.widgets.switches[switch].value = True
     assert page.worker.wait(60)
-    assert len(page.board.figures.diagram.largest.data["parameter"]) == 12
-
-
-class TestOutputs:
-    @staticmethod
-    def oscillator():
-        """The driven oscillator at a stop, with an energy."""
-        system = models.impact_oscillator()
-        more = {
-            "stored": lambda t, x, p: x.v**2 / 2 + p.k * x.x**2 / 2,
-            "drive": {"flight": lambda t, x, p: p.A * np.cos(p.w * t)},
-        }
-        return attrs.evolve(system, outputs=system.outputs | more)
-
-    @pytest.fixture
-    def page(self):
-        page = Page(subject(self.oscillator(), ""), {"columns": "6", "points": "50"}, lambda act: act())
-        assert page.worker.wait(120)
-        yield page
-        page.close()
-
-    @staticmethod
-    def stored(x):
-        return x[:, 1] ** 2 / 2 + x[:, 0] ** 2 / 2
-
-    def column(self, page, source, name):
-        return np.asarray(source.data[page.board.figures.states.column(name)])
-
-    def test_none_is_computed_until_it_is_shown(self, page):
-        points = page.board.figures.section.points
-        assert np.isnan(self.column(page, points, "stored")).all()
-
-    def test_in_the_plane_and_over_time(self, page):
-        page.change(up="stored", over_time="drive")
-        assert page.worker.wait(120)
-        figures, live = page.board.figures, page.board.live
-        found = self.column(page, figures.section.points, "stored")
-        np.testing.assert_allclose(found, self.stored(live.points.x), rtol=1e-12)
-        assert np.isfinite(self.column(page, figures.arc.curves[0], "drive")).any()
-        assert figures.arc.portrait.yaxis[0].axis_label == "stored"
-        assert figures.arc.series_axes.wanted[1] == pytest.approx((-1.0, 1.0), abs=1e-3)
-        assert np.isfinite(self.column(page, figures.arc.start, "stored")).all()
-        after = f"b{figures.states.names.index('stored')}"
-        assert np.isfinite(np.asarray(figures.arc.jumps.data[after])).all()
-
-    def test_in_the_diagram_and_on_the_branch(self, page):
-        page.widgets.switches["orbit"].value = True
-        page.widgets.switches["branch"].value = True
-        page.change(across="stored")
-        assert page.worker.wait(120)
-        diagram = page.board.figures.diagram
-        drawn, x = self.column(page, diagram.points, "stored"), self.column(page, diagram.points, "x")
-        np.testing.assert_allclose(
-            drawn, self.stored(np.column_stack([x, self.column(page, diagram.points, "v")])), rtol=1e-12
-        )
-        assert np.isfinite(self.column(page, diagram.stable, "stored")).any()
-        assert "outputs=['stored']" in page.script()
-        assert np.isfinite(self.column(page, page.board.figures.section.orbit, "stored")).all()
-
-    def test_the_point_that_runs_and_jumps(self, page):
-        page.change(up="stored")
-        assert page.worker.wait(120)
-        page.tick()
-        assert np.isfinite(self.column(page, page.board.figures.arc.at, "stored")).all()
-        page.step(1)
-        assert np.isfinite(self.column(page, page.board.figures.arc.at, "stored")).all()
-
-    def test_an_output_is_no_coordinate_of_a_start(self, page):
-        page.change(up="stored")
-        before = page.scene.x0
-        page.start_here(0.1, 0.2)
-        assert page.scene.x0 == before
-        assert "an output is no coordinate of a start" in page.widgets.words.object
-        page.widgets.switches["basins"].value = True
-        assert page.worker.wait(120)
-        assert "must be two components of the state" in page.board.words["basins"]
-
-    def test_an_address_and_a_saved_picture(self, page):
-        page.change(up="stored")
-        assert page.worker.wait(120)
-        assert page.shared()["up"] == "stored"
-        assert page.saved("section", "png").read()[:4] == b"\x89PNG"
-        assert page.saved("portrait", "png").read()[:4] == b"\x89PNG"
-        page.reset()
-        assert page.scene.up == "v"
-
-
-RELAY = HybridSystem(
-    state=("q",),
-    parameters={"d": 0.5},
-    modes=[Mode("up", lambda t, x, p: (1.0,)), Mode("down", lambda t, x, p: (-1.0,))],
-    transitions=[
-        Transition("up", "down", Guard(lambda t, x, p: x.q - p.d, +1)),
-        Transition("down", "up", Guard(lambda t, x, p: x.q + p.d, -1)),
-    ],
-)
-FALL = HybridSystem(
-    state=("q", "v"),
-    modes=[Mode("fall", lambda t, x, p: (x.v, -9.81))],
-    transitions=[Transition("fall", None, Guard(lambda t, x, p: x.q, -1), name="ground")],
-)
+    assert page.board.words["orbit"] == page.board.words["branch"] == page.board.words["section"] != ""
+    assert "Portrait, section, exponents, orbit and branch: " in page.widgets.messages["top"].text
+    assert said(page).count(page.board.words["section"].replace("'", "&#x27;")) == 1
 
 
 def test_an_unforced_orbit_of_one_state_is_told(opened):
@@ -358,7 +235,7 @@ def test_an_unforced_orbit_of_one_state_is_told(opened):
     page = opened(lambda: RELAY, x0=(0.0,), mode="up")
     page.widgets.switches["orbit"].value = True
     assert page.worker.wait(60)
-    assert "Orbit of period 2 " in page.board.words["orbit"]
+    assert page.board.words["orbit"].startswith("period 2, 2 jumps, ")
     assert "stable" in page.board.words["orbit"]
 
 
@@ -374,8 +251,8 @@ def test_a_run_that_ends_has_no_orbit(opened):
     page.widgets.switches["orbit"].value = True
     assert page.worker.wait(60)
     assert "the arc ends before it can come back" in page.board.words["orbit"]
-    with pytest.raises(ArgumentError, match="nothing has been drawn of 'exponents' yet"):
-        page.saved("exponents", "png")
+    assert page.saved("exponents", "png") is None
+    assert "nothing has been drawn of &#x27;exponents&#x27; yet" in said(page)
 
 
 def test_the_page_has_the_limits_of_an_address(opened):
@@ -384,20 +261,10 @@ def test_the_page_has_the_limits_of_an_address(opened):
     for field, value in (("points", 10**9), ("window", -1.0), ("level", float("nan")), ("columns", 10**9)):
         page.change(**{field: value})
         assert page.scene is before
-        assert f"{field} must be" in page.widgets.words.object
+        assert f"{field} must be" in said(page)
     page.change(points=100)
     assert page.scene.points == 100
-    assert "must be" not in page.widgets.words.object
-
-
-def test_the_ends_of_the_diagram_are_typed_one_after_the_other(opened):
-    page = opened(models.impact_oscillator)
-    page.change(low=5.0)
-    assert "The diagram needs from" in page.widgets.words.object
-    page.change(high=6.0)
-    assert page.worker.wait(60)
-    assert (page.scene.low, page.scene.high) == (5.0, 6.0)
-    assert min(page.board.figures.diagram.largest.data["parameter"]) == 5.0
+    assert "must be" not in said(page)
 
 
 def test_a_click_beyond_a_slider_moves_its_end(opened):
@@ -406,18 +273,6 @@ def test_a_click_beyond_a_slider_moves_its_end(opened):
     assert page.worker.wait(60)
     slider = page.widgets.sliders["w"]
     assert (slider.value, slider.end) == (9.0, 9.0)
-
-
-def test_words_about_columns_are_those_of_a_column_that_ended(opened):
-    """A column that reached its end may carry a remark; it is not why another one ended early."""
-    page = opened(models.impact_oscillator)
-    chart = diagram_call(page.subject, page.scene).result(progress=False)
-    chart["message"] = chart.message.astype(object)
-    chart.message[:2] = ["a remark", "the cause"]
-    chart.status[1] = StatusCode.NON_FINITE
-    job = Job("diagram", "another", (lambda: None,))
-    page.show(Outcome(job, 0, (page.scene, chart), "", 0.0))
-    assert page.board.words["diagram"] == "Diagram: 1 column ended early. the cause"
 
 
 def test_a_picture_that_is_not_there_can_be_held(opened):
@@ -433,7 +288,7 @@ def test_a_system_without_parameters_or_jumps(opened):
     assert page.worker.wait(60)
     assert page.scene.section == "x"
     page.step(1)
-    assert "no jumps" in page.widgets.event.object
+    assert "no jumps" in said(page)
     page.close()
 
 
