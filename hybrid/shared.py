@@ -109,7 +109,7 @@ def described(text: str, names: list[str], texts: Mapping[str, str]) -> str:
     assert found, "a call with shared arguments describes its own parameters"
     section, *others = NEXT_SECTION.split(rest, maxsplit=1)
     blocks = {block.partition("\n")[0]: block for block in NEXT_PARAMETER.split(section.rstrip("\n"))}
-    own = {name: heading for heading in blocks for name in heading.split(", ")}
+    own = {name: heading for heading in blocks for name in heading.partition(" : ")[0].split(", ")}
     groups: list[tuple[list[str], str]] = []
     for name in names:
         if name in own:

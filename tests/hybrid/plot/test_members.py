@@ -84,6 +84,6 @@ def test_the_jumps_of_members_are_lines_of_one_row():
 
 def test_the_transitions_of_members_share_an_arrow():
     ax = plot_graph(pack(12))
-    labels = {text.get_text() for text in ax.texts}
+    labels = {" ".join(text.get_text().split()) for text in ax.texts}
     assert {"done ↑", "cell.fire ×12 ↑", "cell.tick ×12 (every cell.rate)"} <= labels
     assert not any("cell[" in label for label in labels)
