@@ -10,20 +10,17 @@ from bokeh.plotting import figure
 
 from hybrid.explorer.figures.base import States, blank, empty, source, zero_line
 from hybrid.orbits.continuation.branch import Branch
+from hybrid.orbits.kinds import KINDS
 from hybrid.orbits.labelled import table_at
 from hybrid.plot.styles import COLOURS
 from hybrid.simulation.labelled import Names
 from hybrid.system.graph import HybridSystem
 
-# Markers by kind of bifurcation, as in hybrid.plot.
+# Bokeh's names of the markers that kinds of bifurcations have in pictures; it lacks some.
 MARKERS = {
-    "fold": "circle",
-    "flip": "square",
-    "torus": "diamond",
-    "branch point": "plus",
-    "grazing": "inverted_triangle",
-    "crossing-sliding": "triangle",
-}
+    "o": "circle", "s": "square", "D": "diamond", "*": "star", "P": "plus", "h": "hex",
+    "v": "inverted_triangle", "^": "triangle",
+}  # fmt: skip
 OTHER = "x"
 
 
@@ -144,7 +141,7 @@ class DiagramFigures:
                 ),
                 "parameter": [each.value for each in found],
                 "kind": [each.kind for each in found],
-                "marker": [MARKERS.get(each.kind, OTHER) for each in found],
+                "marker": [_marker(each.kind) for each in found],
             }
 
 
@@ -153,3 +150,7 @@ def _output(chart: Any, name: str, outputs: Any) -> np.ndarray:
     if name not in outputs:
         return np.full(chart.section.shape[0] * chart.section.shape[1], np.nan)
     return np.ravel(chart.section_outputs.sel(output=name).values)
+
+
+def _marker(kind: str) -> str:
+    return MARKERS.get(KINDS[kind].marker, OTHER) if kind in KINDS else OTHER
