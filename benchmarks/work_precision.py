@@ -26,6 +26,7 @@ from benchmarks.common import heading
 from benchmarks.peers.problem import ATOL_OVER_RTOL, Problem
 from benchmarks.problems import problems
 from hybrid import DOP853, RadauIIA, Taylor, Tsit5, WorkPrecision, work_precision
+from hybrid.plot import plot_work_precision
 
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 TANGENT_TOLERANCES = (1e-6, 1e-9, 1e-12)
@@ -106,7 +107,7 @@ def draw(results: dict[str, WorkPrecision], path: Path) -> None:
     for ax in grid.ravel()[len(results) :]:
         ax.set_axis_off()
     for ax, (title, result) in zip(grid.ravel(), results.items(), strict=False):
-        result.plot("fundamental" if "fundamental" in result.error else "state", ax=ax)
+        plot_work_precision(result, "fundamental" if "fundamental" in result.error else "state", ax=ax)
         ax.set_title(title, loc="left", fontsize=10)
     figure.savefig(path, dpi=90, metadata={"Software": None})
     plt.close(figure)

@@ -43,8 +43,10 @@ LEGEND = {
 
 
 def room_of(path: Path) -> str:
-    """The room of a file: its folder in hybrid, or the package."""
+    """The room of a file: its folder in hybrid, or the package; a command is a room of its own."""
     parts = path.relative_to(ROOT).with_suffix("").parts
+    if parts[-1] == "__main__":
+        return ".".join(parts)
     if parts[0] != "hybrid":
         return parts[0]
     return "hybrid" if parts[1] == "__init__" else f"hybrid.{parts[1]}"
@@ -57,6 +59,9 @@ def rooms() -> nx.DiGraph:
         for path in sorted((ROOT / package).rglob("*.py")):
             graph.add_node(room_of(path))
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                whole = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+                for each in {name for name in whole if name in PACKAGES} - {room_of(path)}:
+                    graph.add_edge(room_of(path), each)
                 module = getattr(node, "module", None) or ""
                 if isinstance(node, ast.ImportFrom) and module.partition(".")[0] in PACKAGES:
                     parts = module.split(".")
@@ -89,7 +94,8 @@ def draw(graph: nx.DiGraph, path: Path) -> None:
     boxes = {}
     for room, (x, y) in places.items():
         colour = COLOURS[kinds.get(room, "base")]
-        name = room if room.count(".") == 0 else room.partition(".")[2]
+        package, _, inner = room.partition(".")
+        name = f"python -m {package}" if inner == "__main__" else inner or package
         style = {"boxstyle": "round,pad=0.45", "facecolor": "white", "edgecolor": colour, "linewidth": 1.6}
         text = ax.text(x, y, name, ha="center", va="center", fontsize=10, bbox=style, zorder=3)
         boxes[room] = text.get_bbox_patch()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Unpack
 
 import attrs
 import numpy as np
@@ -21,9 +20,6 @@ from hybrid.solvers import Solver
 from hybrid.solvers.solver import LEAST_RTOL
 from hybrid.status import Status, StatusCode
 from hybrid.system.graph import HybridSystem, as_system
-
-if TYPE_CHECKING:
-    from hybrid.plot.picture import Look
 
 TIGHTER = (10.0, 100.0)
 EPSILON = float(np.finfo(float).eps)
@@ -62,12 +58,6 @@ class GlobalError:
     x: np.ndarray
     jumps: np.ndarray
     status: Status
-
-    def plot(self, **options: Unpack[Look]) -> np.ndarray:
-        """Draw the bounds, see :func:`hybrid.plot.plot_global_error`."""
-        from hybrid.plot import plot_global_error
-
-        return plot_global_error(self, **options)
 
     def __repr__(self) -> str:
         times = f", {self.jumps.max():.1e} in time of jumps" if len(self.jumps) else ""

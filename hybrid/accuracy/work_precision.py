@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Unpack
 
 import attrs
 import numpy as np
@@ -19,11 +18,6 @@ from hybrid.simulation.arc import HybridArc
 from hybrid.solvers import DOP853, Solver, Taylor, Tsit5
 from hybrid.status import StatusCode
 from hybrid.system.graph import HybridSystem, as_system, check_mode
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from hybrid.plot.picture import Look
 
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 METHODS: Mapping[str, Solver] = {"Taylor": Taylor(), "DOP853": DOP853(), "Tsit5": Tsit5()}
@@ -126,16 +120,6 @@ class WorkPrecision:
             return float("nan")
         logs = np.log(np.array(points))
         return float(np.exp(np.interp(np.log(error), logs[:, 0], logs[:, 1])))
-
-    def plot(
-        self,
-        quantity: str = "state",
-        **options: Unpack[Look],
-    ) -> Axes:
-        """Draw error over time, see :func:`hybrid.plot.plot_work_precision`."""
-        from hybrid.plot import plot_work_precision
-
-        return plot_work_precision(self, quantity, **options)
 
     def error_of(self, quantity: str) -> np.ndarray:
         """Column ``(rows,)`` of the errors of a quantity.

@@ -10,6 +10,8 @@ from types import ModuleType
 from typing import Any
 
 from hybrid import arguments
+from hybrid.accuracy.global_error import GlobalError
+from hybrid.accuracy.work_precision import WorkPrecision
 from hybrid.orbits.continuation.bifurcation_curve import BifurcationCurve
 from hybrid.orbits.continuation.branch import Branch
 from hybrid.orbits.diagrams.diagram import Diagram
@@ -105,9 +107,11 @@ drawn.register(list, plot_branch)
 drawn.register(tuple, plot_branch)
 drawn.register(BifurcationCurve, plot_curve)
 drawn.register(HybridSystem, plot_graph)
+drawn.register(GlobalError, plot_global_error)
 drawn.register(Jumps, plot_jumps)
 drawn.register(Section, plot_section)
 drawn.register(PeriodicOrbit, plot_orbit)
+drawn.register(WorkPrecision, plot_work_precision)
 DATASETS["t_end"] = plot_ends
 DATASETS["label"] = plot_basins
 DATASETS["fraction"] = plot_fractions
@@ -117,11 +121,12 @@ def plot(result: Any, **options: Any) -> Any:
     """Draw a system or a result with the function for its type.
 
     An arc is drawn by :func:`plot_arc`, a system by :func:`plot_graph`, a section by :func:`plot_section`,
-    a periodic orbit by :func:`plot_orbit`, jumps by :func:`plot_jumps`, a dataset of ``simulate_many`` by
-    :func:`plot_ends`, one of ``basins`` by :func:`plot_basins`, one of ``basin_fractions`` by
-    :func:`plot_fractions` and one of ``sweep`` by :func:`plot_sweep`. A spectrum, a chart, a comparison of
-    models and exponents from two orbits are drawn by ``lyapunov.plot``, and any other object by its method
-    ``plot``. A list of branches is drawn into one picture.
+    a periodic orbit by :func:`plot_orbit`, jumps by :func:`plot_jumps`, what ``global_error`` finds by
+    :func:`plot_global_error` and what ``work_precision`` finds by :func:`plot_work_precision`. A dataset of
+    ``simulate_many`` is drawn by :func:`plot_ends`, one of ``basins`` by :func:`plot_basins`, one of
+    ``basin_fractions`` by :func:`plot_fractions` and one of ``sweep`` by :func:`plot_sweep`. A spectrum, a
+    chart, a comparison of models and exponents from two orbits are drawn by ``lyapunov.plot``, and any other
+    object by its method ``plot``. A list of branches is drawn into one picture.
 
     Parameters
     ----------

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
 from hybrid import arguments
+from hybrid.accuracy.global_error import GlobalError
 from hybrid.plot.axes import (
     Rows,
     axes_for,
@@ -18,7 +19,6 @@ from hybrid.plot.labels import label_of
 from hybrid.plot.legends import small_legend
 from hybrid.plot.picture import Look, picture
 from hybrid.plot.styles import colour_of, dot_size
-from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.jumps import Jumps
 from hybrid.system.members import about_all, shared_name, shared_names
 
@@ -30,25 +30,6 @@ MARKS = {"transverse": "|", "grazing": "o", "limit": ">"}
 MEMBER = 0.25
 # The least error drawn on a logarithmic scale.
 LEAST = 1e-300
-
-
-class ErrorBounds(Protocol):
-    """The data to draw: a run and the bounds of its errors, from :func:`hybrid.global_error`."""
-
-    @property
-    def arc(self) -> HybridArc:
-        """The run."""
-        ...
-
-    @property
-    def x(self) -> np.ndarray:
-        """Bounds of the errors of the last state."""
-        ...
-
-    @property
-    def jumps(self) -> np.ndarray:
-        """Bounds of the errors of the times of the jumps."""
-        ...
 
 
 @picture
@@ -113,7 +94,7 @@ def _mark(ax: Axes, jumps: Jumps, name: str, height: float, colour: str, size: f
 
 
 @picture
-def plot_global_error(result: ErrorBounds, **look: Unpack[Look]) -> Rows:
+def plot_global_error(result: GlobalError, **look: Unpack[Look]) -> Rows:
     """Draw the bounds of the errors: of the last state per component, below of the times of the jumps.
 
     Parameters
@@ -136,7 +117,7 @@ def plot_global_error(result: ErrorBounds, **look: Unpack[Look]) -> Rows:
     >>> len(plot_global_error(found))
     2
     """
-    if not isinstance(getattr(result, "arc", None), HybridArc):
+    if not isinstance(result, GlobalError):
         raise arguments.refusal("result", "be a GlobalError, from hybrid.global_error", result)
     system, bounds = result.arc.system, result.jumps
     count = 2 if len(bounds) else 1

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
 from hybrid import arguments
+from hybrid.accuracy.work_precision import WorkPrecision
 from hybrid.plot.axes import (
     axes_for,
     logarithmic,
@@ -24,35 +24,8 @@ MARKERS = "osD^vP*"
 LABEL_HEIGHT = 9.0
 
 
-class Measurement(Protocol):
-    """The data to draw: times and errors of methods, as measured by :func:`hybrid.work_precision`."""
-
-    @property
-    def methods(self) -> Sequence[str]:
-        """Names of the methods."""
-        ...
-
-    @property
-    def seconds(self) -> np.ndarray:
-        """Seconds taken, one per row."""
-        ...
-
-    @property
-    def reference_error(self) -> Mapping[str, float]:
-        """Error of the reference itself, by quantity."""
-        ...
-
-    def rows_of(self, method: str) -> np.ndarray:
-        """Mask of the rows that belong to a method."""
-        ...
-
-    def error_of(self, quantity: str) -> np.ndarray:
-        """Errors of a quantity, one per row."""
-        ...
-
-
 @picture
-def plot_work_precision(result: Measurement, quantity: str = "state", **look: Unpack[Look]) -> Axes:
+def plot_work_precision(result: WorkPrecision, quantity: str = "state", **look: Unpack[Look]) -> Axes:
     """Draw error over time on logarithmic scales: one line per method, the reference's own error in grey.
 
     Nearer to the lower left is better. Failed runs and errors of exactly zero are not drawn.
@@ -84,7 +57,7 @@ def plot_work_precision(result: Measurement, quantity: str = "state", **look: Un
     >>> ax.get_xscale(), ax.get_yscale()
     ('log', 'log')
     """
-    if not hasattr(result, "error_of"):
+    if not isinstance(result, WorkPrecision):
         raise arguments.refusal("result", "be a WorkPrecision, from hybrid.work_precision", result)
     error = result.error_of(quantity)
     (ax,) = axes_for(look, 1, (6.4, 4.6))

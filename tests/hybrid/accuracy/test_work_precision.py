@@ -21,7 +21,7 @@ from hybrid import (
     Transition,
     work_precision,
 )
-from hybrid.plot import plot_work_precision
+from hybrid.plot import plot, plot_work_precision
 from tests.reference.load import reference
 
 E = 0.5
@@ -313,7 +313,7 @@ def test_the_table_and_the_columns(lines):
 
 
 def test_the_plot_has_a_line_a_method_and_its_name(lines):
-    axes = lines.plot()
+    axes = plot(lines)
     drawn = [line.get_xydata() for line in axes.get_lines()]
     np.testing.assert_allclose(drawn[1], np.column_stack([lines.seconds[3:], lines.error["state"][3:]]))
     assert [text.get_text() for text in axes.texts] == ["quick", "slow"]

@@ -9,27 +9,28 @@ import pytest
 mpl.use("Agg")
 
 
+from hybrid import WorkPrecision
 from hybrid.plot import plot_work_precision
 from hybrid.plot.styles import COLOURS
 from hybrid.plot.work_precision import LABEL_HEIGHT, MARKERS
 
 
-class Made:
+def made(lines, floor=np.nan):
     """Made-up measurements ``{method: (seconds, errors)}``."""
-
-    def __init__(self, lines, floor=np.nan):
-        self.methods = list(lines)
-        self.names = np.repeat(self.methods, [len(seconds) for seconds, _ in lines.values()])
-        self.seconds = np.concatenate([seconds for seconds, _ in lines.values()])
-        self.errors = np.concatenate([errors for _, errors in lines.values()])
-        self.reference_error = {"state": floor}
-
-    def rows_of(self, method):
-        return self.names == method
-
-    def error_of(self, quantity):
-        assert quantity == "state"
-        return self.errors
+    counts = [len(seconds) for seconds, _ in lines.values()]
+    seconds, errors = (np.concatenate(each) for each in zip(*lines.values(), strict=True))
+    unknown = np.full(len(seconds), np.nan)
+    return WorkPrecision(
+        method=np.repeat([*lines], counts),
+        tolerance=unknown,
+        error={"state": errors},
+        seconds=seconds,
+        compile_seconds=unknown,
+        steps=unknown,
+        events=unknown,
+        status=np.full(len(seconds), "SUCCESS"),
+        reference_error={"state": floor},
+    )
 
 
 def labels(ax):
@@ -42,7 +43,7 @@ def test_runs_that_failed_and_errors_of_zero_are_not_drawn():
         "none": ([1.0], [np.nan]),
         "b": ([1.0, 2.0], [1e-2, 0.0]),
     }
-    ax = plot_work_precision(Made(lines))
+    ax = plot_work_precision(made(lines))
     one, two = ax.lines
     np.testing.assert_array_equal(one.get_xydata(), [[1.0, 1e-3], [3.0, 1e-9]])
     np.testing.assert_array_equal(two.get_xydata(), [[1.0, 1e-2]])
@@ -55,14 +56,14 @@ def test_runs_that_failed_and_errors_of_zero_are_not_drawn():
 
 def test_colours_come_first_and_then_markers():
     count = len(COLOURS) + 1
-    ax = plot_work_precision(Made({f"m{k}": ([1.0, 2.0], [10.0**-k, 0.1**k / 2]) for k in range(count)}))
+    ax = plot_work_precision(made({f"m{k}": ([1.0, 2.0], [10.0**-k, 0.1**k / 2]) for k in range(count)}))
     assert [line.get_color() for line in ax.lines] == [*COLOURS, COLOURS[0]]
     assert [line.get_marker() for line in ax.lines] == [*MARKERS[0] * len(COLOURS), MARKERS[1]]
 
 
 @pytest.mark.parametrize("floor", [1e-14, 1e-6, 1e-1])
 def test_the_reference_s_own_error_is_shown(floor):
-    ax = plot_work_precision(Made({"a": ([1.0, 10.0], [1e-2, 1e-8])}, floor))
+    ax = plot_work_precision(made({"a": ([1.0, 10.0], [1e-2, 1e-8])}, floor))
     [band] = ax.patches
     low, high = band.get_y(), band.get_y() + band.get_height()
     assert high == pytest.approx(floor)
@@ -71,8 +72,8 @@ def test_the_reference_s_own_error_is_shown(floor):
     assert low < bottom <= floor / 3
     assert bottom <= 1e-8 < 1e-2 <= top
     for unknown in (np.nan, 0.0, np.inf):
-        assert not plot_work_precision(Made({"a": ([1.0], [1e-2])}, unknown)).patches
-    empty = plot_work_precision(Made({"a": ([1.0], [np.nan])}, floor))
+        assert not plot_work_precision(made({"a": ([1.0], [1e-2])}, unknown)).patches
+    empty = plot_work_precision(made({"a": ([1.0], [np.nan])}, floor))
     assert not empty.patches
     assert not empty.lines
 
@@ -83,7 +84,7 @@ def test_labels_are_right_of_their_points_and_apart(spread):
     count = 8
     ends = 1e-6 * 10.0 ** (spread * np.arange(count))
     lines = {f"method {k}": ([1.0, 10.0], [1e-2, ends[k]]) for k in reversed(range(count))}
-    ax = plot_work_precision(Made(lines))
+    ax = plot_work_precision(made(lines))
     figure = ax.get_figure()
     figure.draw_without_rendering()
     point = figure.dpi / 72
@@ -105,7 +106,7 @@ def test_labels_are_right_of_their_points_and_apart(spread):
 
 
 def test_labels_far_apart_in_time_stay_at_their_points():
-    ax = plot_work_precision(Made({"a": ([1.0, 1e-3], [1.0, 1e-6]), "b": ([1.0, 1e3], [1.0, 1e-6])}))
+    ax = plot_work_precision(made({"a": ([1.0, 1e-3], [1.0, 1e-6]), "b": ([1.0, 1e3], [1.0, 1e-6])}))
     assert [text.xyann for text in ax.texts] == [pytest.approx((6.0, 0.0), abs=1e-9)] * 2
 
 
