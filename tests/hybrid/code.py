@@ -10,8 +10,8 @@ import numpy as np
 from hybrid.compiler.cases import cases_in
 from hybrid.compiler.llvm.engine import load
 from hybrid.compiler.llvm.functions import SIGNATURES
-from hybrid.compiler.llvm.lowering import SERIES_SIGNATURE, VECTOR_SIGNATURE, Function
 from hybrid.compiler.llvm.machine import machine_code
+from hybrid.compiler.llvm.wanted import SERIES_SIGNATURE, VECTOR_SIGNATURE, Function
 from hybrid.compiler.statements.code import at
 from hybrid.compiler.statements.values import assignments
 from hybrid.expression.vocabulary import named

@@ -9,8 +9,9 @@ from llvmlite import ir
 
 from hybrid.compiler.llvm.calls import CALLS, NUMBER, WHOLE
 from hybrid.compiler.llvm.columns import write_convolved
-from hybrid.compiler.llvm.lowering import TRUTH, Body, Signature
+from hybrid.compiler.llvm.lowering import TRUTH, Body
 from hybrid.compiler.llvm.registers import joined
+from hybrid.compiler.llvm.wanted import Signature
 from hybrid.compiler.llvm.waves import sine
 from hybrid.compiler.statements.code import LoweringError
 from hybrid.kernels.instructions.loops import declared

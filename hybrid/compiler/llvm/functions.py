@@ -14,7 +14,8 @@ from hybrid.compiler.cache.store import kept_of_model, models_folder
 from hybrid.compiler.cases import Case, cases_in, function_text
 from hybrid.compiler.llvm.abreast import ABREAST_SIGNATURE, AbreastBody
 from hybrid.compiler.llvm.engine import load, processor
-from hybrid.compiler.llvm.lowering import (
+from hybrid.compiler.llvm.machine import LOOPS, NO_LOOPS, NOTHING_BUT_LOOPS, machine_code
+from hybrid.compiler.llvm.wanted import (
     MATRIX_SIGNATURE,
     SERIES_SIGNATURE,
     VECTOR_SIGNATURE,
@@ -22,7 +23,6 @@ from hybrid.compiler.llvm.lowering import (
     Function,
     OwnFunction,
 )
-from hybrid.compiler.llvm.machine import LOOPS, NO_LOOPS, NOTHING_BUT_LOOPS, machine_code
 from hybrid.compiler.opaque import compiled_functions
 from hybrid.compiler.parts import PARTS, SLOPES
 from hybrid.compiler.statements.code import bodies_in

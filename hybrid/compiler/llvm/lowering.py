@@ -15,6 +15,7 @@ from llvmlite import ir
 
 from hybrid.compiler.llvm.calls import CALLS, NUMBER, WHOLE
 from hybrid.compiler.llvm.engine import vectors
+from hybrid.compiler.llvm.wanted import NO_CALLS, CaseTable, Function, OwnFunction
 from hybrid.compiler.statements.code import KNOWN, LoweringError
 from hybrid.kernels.instructions.loops import loop
 from hybrid.kernels.instructions.registers import Matrix, everywhere, vector_of
@@ -40,68 +41,6 @@ class Vector:
     data: Any
     length: Any
     kind: Any = NUMBER
-
-
-@attrs.frozen
-class OwnFunction:
-    """A function of the user: the address of its machine code, and the number of values that it writes."""
-
-    address: int
-    size: int
-
-
-@attrs.frozen
-class CaseTable:
-    """The cases of a function that are compiled already: where the address of each, by index, is stored.
-
-    They take the arguments of the function.
-    """
-
-    address: int
-
-
-NO_CALLS: Mapping[str, OwnFunction | CaseTable] = {}
-
-
-@attrs.frozen
-class Signature:
-    """Names and types of the arguments of a function; an integer is an array with that number of axes."""
-
-    names: tuple[str, ...]
-    types: tuple[Any, ...]
-
-
-VECTOR_SIGNATURE = Signature(("index", "t", "x", "p", "out"), (WHOLE, NUMBER, 1, 1, 1))
-MATRIX_SIGNATURE = Signature(("index", "t", "x", "p", "out"), (WHOLE, NUMBER, 1, 1, 2))
-SERIES_SIGNATURE = Signature(("index", "t", "x", "p", "order", "out"), (WHOLE, NUMBER, 1, 1, WHOLE, 2))
-
-
-@attrs.frozen
-class Function:
-    """A function to be compiled.
-
-    Attributes
-    ----------
-    name
-        Its name in the machine code.
-    signature
-        Names and types of its arguments.
-    cases
-        Indices, with the statements for them; a case without indices is run for every index.
-    fused
-        Whether multiplications and additions may be fused.
-    loops
-        The level of LLVM's passes for its loops (``hybrid.compiler.llvm.machine``).
-    body
-        What writes its instructions; ``Body`` for None.
-    """
-
-    name: str
-    signature: Signature
-    cases: Sequence[Any]
-    fused: bool = False
-    loops: int = 0
-    body: Any = None
 
 
 def lower(module: Any, written: Function, calls: Mapping[str, OwnFunction | CaseTable] = NO_CALLS) -> None:

@@ -9,7 +9,8 @@ from llvmlite import binding, ir
 
 from hybrid.compiler.interrupts import between_passes
 from hybrid.compiler.llvm.engine import HASTE, PLAIN, SPEED, target
-from hybrid.compiler.llvm.lowering import NO_CALLS, CaseTable, Function, OwnFunction, lower
+from hybrid.compiler.llvm.lowering import lower
+from hybrid.compiler.llvm.wanted import NO_CALLS, CaseTable, Function, OwnFunction
 
 # Functions with more instructions than this, as written, are optimised and emitted in haste: the time of LLVM
 # grows faster than their length, and they run no slower.

@@ -24,9 +24,10 @@ from hybrid.compiler.propagators.writing import (
 )
 from hybrid.compiler.statements.code import Code, Statement, at, call, get, less, put, several, when
 from hybrid.compiler.statements.values import assignments
+from hybrid.compiler.taylor.coefficients import ONE_THEN_ZERO, ORDER, OUT, o
 from hybrid.compiler.taylor.convolutions import InMemory, InRegisters
 from hybrid.compiler.taylor.loops import StateLoop, TangentLoop
-from hybrid.compiler.taylor.series import ONE_THEN_ZERO, ORDER, OUT, NoSeries, Recurrences, o
+from hybrid.compiler.taylor.series import NoSeries, Recurrences
 from hybrid.expression.derivatives import derivative, directional, divergence
 from hybrid.expression.graph import all_replaced, degree_of, is_negative, is_whole, replaced
 from hybrid.expression.nodes import Expression, Symbol, add, multiply

@@ -8,8 +8,8 @@ from hybrid.compiler.emitted import Propagator, Series
 from hybrid.compiler.propagators.equations import Boundary, Equations, in_terms_of_root
 from hybrid.compiler.propagators.writing import Body, names_of_state, seeds_of
 from hybrid.compiler.statements.code import get
+from hybrid.compiler.taylor.coefficients import ONE_THEN_ZERO
 from hybrid.compiler.taylor.roots import Root, in_roots, regular_root
-from hybrid.compiler.taylor.series import ONE_THEN_ZERO
 from hybrid.expression.derivatives import directional, divergence
 from hybrid.expression.nodes import Expression
 from hybrid.expression.tracing import Symbols

@@ -23,10 +23,11 @@ from hybrid.compiler.statements.code import (
     whole,
 )
 from hybrid.compiler.statements.values import Constants, assignments
+from hybrid.compiler.taylor.coefficients import ONE_THEN_ZERO, ORDER, o
 from hybrid.compiler.taylor.convolutions import padded
 from hybrid.compiler.taylor.loops import GROUPS, StateLoop, TangentLoop, reciprocal
 from hybrid.compiler.taylor.pairs import columns_of
-from hybrid.compiler.taylor.series import ONE_THEN_ZERO, ORDER, PAIRS, Recurrences, o
+from hybrid.compiler.taylor.series import PAIRS, Recurrences
 from hybrid.expression.derivatives import derivative, directional, divergence
 from hybrid.expression.graph import mentions, nodes_of
 from hybrid.expression.nodes import ZERO, Expression, Symbol, add, order_of

@@ -24,8 +24,9 @@ from hybrid.compiler.statements.code import (
     several,
     when,
 )
+from hybrid.compiler.taylor.coefficients import ORDER, OUT, o
 from hybrid.compiler.taylor.pairs import Layer
-from hybrid.compiler.taylor.series import ORDER, OUT, Recurrences, o
+from hybrid.compiler.taylor.series import Recurrences
 from hybrid.kernels.types.codes import NARROW
 
 # Sums of more convolutions than this, with the newest coefficients, do not fit into registers.

@@ -28,9 +28,9 @@ from hybrid.compiler.statements.code import (
     when,
 )
 from hybrid.compiler.statements.values import Constants
+from hybrid.compiler.taylor.coefficients import ORDER, OUT, o
 from hybrid.compiler.taylor.convolutions import padded
 from hybrid.compiler.taylor.loops import GROUPS, TABLE, VECTORS
-from hybrid.compiler.taylor.series import ORDER, OUT, o
 from hybrid.expression.derivatives import partial_derivatives
 from hybrid.expression.graph import degree_of, mentions, replaced
 from hybrid.expression.nodes import ONE, ZERO, Expression, Symbol, add

@@ -7,9 +7,10 @@ from functools import cached_property
 from typing import Any
 
 from hybrid.compiler.statements.code import Code, Statement, at, call, do, get, less, loop, put, several, when
+from hybrid.compiler.taylor.coefficients import ORDER, OUT, o
 from hybrid.compiler.taylor.convolutions import AT_HAND, InMemory, convolutions, in_turn, padded
 from hybrid.compiler.taylor.pairs import Layer, layers
-from hybrid.compiler.taylor.series import ORDER, OUT, Recurrences, o
+from hybrid.compiler.taylor.series import Recurrences
 from hybrid.expression.graph import mentions
 from hybrid.expression.nodes import Expression, Symbol
 from hybrid.kernels.types.codes import HIGHEST_ORDER, NARROW, WIDE

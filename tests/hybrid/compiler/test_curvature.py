@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hybrid.compiler.curvature import UNKNOWN, curvature
-from hybrid.compiler.llvm.lowering import VECTOR_SIGNATURE
+from hybrid.compiler.llvm.wanted import VECTOR_SIGNATURE
 from hybrid.compiler.statements.code import at, put
 from hybrid.expression.tracing import model_symbols, trace
 from tests.hybrid.code import interpreted

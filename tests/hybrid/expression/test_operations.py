@@ -9,7 +9,7 @@ from numba import njit
 from hybrid import HybridSystem, Mode
 from hybrid.compiler.bounds.program import programs
 from hybrid.compiler.emit import emit
-from hybrid.compiler.llvm.lowering import VECTOR_SIGNATURE
+from hybrid.compiler.llvm.wanted import VECTOR_SIGNATURE
 from hybrid.compiler.parts import PARTS, SERIES
 from hybrid.compiler.statements.code import at
 from hybrid.compiler.statements.values import assignments, unprintable

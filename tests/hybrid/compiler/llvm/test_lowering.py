@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 from llvmlite import binding, ir
 
 from hybrid.compiler.llvm.calls import NUMBER, WHOLE
-from hybrid.compiler.llvm.lowering import MATRIX_SIGNATURE, VECTOR_SIGNATURE, LoweringError
+from hybrid.compiler.llvm.lowering import LoweringError
+from hybrid.compiler.llvm.wanted import MATRIX_SIGNATURE, VECTOR_SIGNATURE
 from hybrid.compiler.statements.code import at, call, do, either, equal, get, less, loop, put, several, when
 from hybrid.compiler.statements.values import assignments
-from hybrid.compiler.taylor.series import OUT
+from hybrid.compiler.taylor.coefficients import OUT
 from hybrid.kernels.types.numba_door.builder import Builder
 from tests.hybrid.code import both
 from tests.hybrid.expression.formulas import anything, expression_of

@@ -5,7 +5,7 @@ import pytest
 
 from hybrid.compiler.llvm import machine
 from hybrid.compiler.llvm.engine import HASTE, SPEED, target
-from hybrid.compiler.llvm.lowering import VECTOR_SIGNATURE
+from hybrid.compiler.llvm.wanted import VECTOR_SIGNATURE
 from hybrid.compiler.statements.code import at, call, get, put
 from tests.hybrid.code import both
 

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from hybrid import HybridSystem, Mode
 from hybrid.compiler.emit import emit
 from hybrid.compiler.llvm.functions import compiled_part
-from hybrid.compiler.llvm.lowering import SERIES_SIGNATURE
+from hybrid.compiler.llvm.wanted import SERIES_SIGNATURE
 from hybrid.compiler.parts import FIELDS, PARTS, TANGENT_SERIES, VARIATIONAL
 from hybrid.compiler.statements.code import at, call, do, either, get, less, loop, put, several, when, whole
 from hybrid.compiler.statements.rolled import rolled
-from hybrid.compiler.taylor.series import OUT
+from hybrid.compiler.taylor.coefficients import OUT
 from hybrid.kernels.types.codes import NARROW
 from tests.hybrid.code import both, called, functions_in, interpreted
 

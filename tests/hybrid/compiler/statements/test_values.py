@@ -11,7 +11,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from hybrid.compiler.llvm.lowering import VECTOR_SIGNATURE
+from hybrid.compiler.llvm.wanted import VECTOR_SIGNATURE
 from hybrid.compiler.statements.code import at as entry
 from hybrid.compiler.statements.code import get, put
 from hybrid.compiler.statements.values import Constants, assignments, root_power, unprintable

@@ -7,8 +7,8 @@ from numba import njit
 from hybrid.compiler.llvm import lowering
 from hybrid.compiler.llvm.registers import Vectors
 from hybrid.compiler.statements.code import call, do, get, put, several
+from hybrid.compiler.taylor.coefficients import ORDER, OUT
 from hybrid.compiler.taylor.loops import VECTORS
-from hybrid.compiler.taylor.series import ORDER, OUT
 from hybrid.kernels.arithmetic.columns import (
     evaluate,
     evaluate_with_sizes,

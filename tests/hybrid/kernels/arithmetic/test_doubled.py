@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hybrid.compiler.statements.code import at, call, do, get, put, several
-from hybrid.compiler.taylor.series import OUT
+from hybrid.compiler.taylor.coefficients import OUT
 from tests.hybrid.code import both
 
 # Row 0 holds two times four numbers, row 1 their dot product with a and b, row 2 one of all of these.

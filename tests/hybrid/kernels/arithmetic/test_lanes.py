@@ -7,7 +7,7 @@ import pytest
 from numba import njit
 
 from hybrid.compiler.statements.code import at, call, do, several
-from hybrid.compiler.taylor.series import OUT
+from hybrid.compiler.taylor.coefficients import OUT
 from hybrid.kernels.arithmetic.lanes import NARROW, four_times, largest, largest_of_each, load, places, store
 from hybrid.kernels.arithmetic.wide import larger, magnitude, square_root
 from tests.hybrid import in_python
