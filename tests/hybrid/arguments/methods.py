@@ -8,9 +8,7 @@ import hybrid
 import lyapunov
 from hybrid import HybridSystem, measures
 from models import contact
-from tests.hybrid.arguments.plots import FIGSIZE
 from tests.hybrid.arguments.values import (
-    AXES,
     BALL,
     COUNT,
     LIMIT,
@@ -182,11 +180,6 @@ def methods(made):
                 "quantity": [None, *NAME],
             },
         ),
-        (
-            call(hybrid.WorkPrecision.plot, made["work"]),
-            {"ax": AXES, "quantity": [None, *NAME], "figsize": FIGSIZE},
-        ),
-        (call(hybrid.GlobalError.plot, made["error"]), {"ax": AXES, "figsize": FIGSIZE}),
         (
             call(lyapunov.LyapunovSpectrum.per, made["impacts"], "impact"),
             {"transition": [None, *NAME]},
