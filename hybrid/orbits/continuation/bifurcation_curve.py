@@ -9,9 +9,9 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
-from hybrid.display.tables import counted
 from hybrid.orbits.kinds import plural
 from hybrid.orbits.orbit import PeriodicOrbit
+from hybrid.orbits.over_two import OverTwo, SpecialPoint
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @attrs.frozen(eq=False)
-class CodimensionTwo:
+class CodimensionTwo(SpecialPoint):
     """Where two things happen at once on a curve of bifurcations.
 
     Attributes
@@ -50,13 +50,9 @@ class CodimensionTwo:
     orbit: PeriodicOrbit
     message: str
 
-    def __str__(self) -> str:
-        where = ", ".join(f"{name} = {value:.10g}" for name, value in self.values.items())
-        return f"{self.kind} at {where}: {self.message}"
-
 
 @attrs.frozen(eq=False, repr=False)
-class BifurcationCurve:
+class BifurcationCurve(OverTwo):
     """A bifurcation over two parameters; ``curve["omega"]`` are the values of one.
 
     ``curve["peak"]`` is what a function in ``outputs=`` of :func:`hybrid.continue_bifurcation` makes of the
@@ -113,15 +109,6 @@ class BifurcationCurve:
             what, kind = "curve: Parameter or output", "Parameters and outputs"
         arguments.known(what, name, (*self.names, *self.outputs), kind)
         return self.values[:, self.names.index(name)]
-
-    def __len__(self) -> int:
-        return len(self.values)
-
-    def __repr__(self) -> str:
-        spans = ", ".join(f"{name} = {self[name].min():.6g} to {self[name].max():.6g}" for name in self.names)
-        special = ", ".join(each.kind for each in self.points) or "nothing special"
-        kinds, count = plural(self.kind), counted(len(self), "point")
-        return f"<Curve of {kinds}, {spans}, {count}, {special}, {self.status.brief}>"
 
     def orbit(self, i: int) -> PeriodicOrbit:
         """The orbit of a point of the curve.

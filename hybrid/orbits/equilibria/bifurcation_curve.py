@@ -9,10 +9,9 @@ import attrs
 import numpy as np
 
 from hybrid import arguments
-from hybrid.display.tables import counted
 from hybrid.orbits.equilibria.equations import Equations
 from hybrid.orbits.equilibria.equilibrium import Equilibrium, described
-from hybrid.orbits.kinds import plural
+from hybrid.orbits.over_two import OverTwo, SpecialPoint
 from hybrid.simulation.labelled import Names, attributes
 from hybrid.status import Status
 from hybrid.system.graph import HybridSystem
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @attrs.frozen(eq=False)
-class SpecialEquilibrium:
+class SpecialEquilibrium(SpecialPoint):
     """Where two things happen at once on a curve of bifurcations of an equilibrium.
 
     Attributes
@@ -54,13 +53,9 @@ class SpecialEquilibrium:
     equilibrium: Equilibrium
     message: str
 
-    def __str__(self) -> str:
-        where = ", ".join(f"{name} = {value:.10g}" for name, value in self.values.items())
-        return f"{self.kind} at {where}: {self.message}"
-
 
 @attrs.frozen(eq=False, repr=False)
-class EquilibriumCurve:
+class EquilibriumCurve(OverTwo):
     """A bifurcation of an equilibrium over two parameters; ``curve["q"]`` are the values of one.
 
     Attributes
@@ -107,15 +102,6 @@ class EquilibriumCurve:
     def __getitem__(self, name: str) -> np.ndarray:
         arguments.known("curve: Parameter", name, self.names, "Parameters")
         return self.values[:, self.names.index(name)]
-
-    def __len__(self) -> int:
-        return len(self.values)
-
-    def __repr__(self) -> str:
-        spans = ", ".join(f"{name} = {self[name].min():.6g} to {self[name].max():.6g}" for name in self.names)
-        special = ", ".join(each.kind for each in self.points) or "nothing special"
-        kinds, count = plural(self.kind), counted(len(self), "point")
-        return f"<Curve of {kinds}, {spans}, {count}, {special}, {self.status.brief}>"
 
     def equilibrium(self, i: int) -> Equilibrium:
         """The equilibrium of a point of the curve.
