@@ -95,23 +95,16 @@ def _derivatives(a: Sources, name: str, rows: Any, functions: Sequence[Written])
     return [a.writer.text(name, each, partial(rows, each.derivative, n)) for each in functions]
 
 
-def _series(a: Sources) -> list[str]:
-    return placed(a.places, [a.writer.text("series", each, each.statements) for each in a.series])
-
-
-def _tangent_series(a: Sources) -> list[str]:
-    return placed(a.places, [a.writer.text("tangent", each, each.tangent_statements) for each in a.series])
-
-
-# Registers of several runs are no entries of arrays, which loops over statements need.
-def _series_abreast(a: Sources) -> list[str]:
-    texts = [a.writer.text("series", each, each.statements, roll=False) for each in a.abreast]
-    return placed(a.places_abreast, texts)
-
-
-def _tangent_series_abreast(a: Sources) -> list[str]:
-    texts = [a.writer.text("tangent", each, each.tangent_statements, roll=False) for each in a.abreast]
-    return placed(a.places_abreast, texts)
+def _series(a: Sources, *, tangent: bool, abreast: bool) -> list[str]:
+    series, places = (a.abreast, a.places_abreast) if abreast else (a.series, a.places)
+    texts = [
+        # Registers of several runs are no entries of arrays, which loops over statements need.
+        a.writer.text("tangent", each, each.tangent_statements, roll=not abreast)
+        if tangent
+        else a.writer.text("series", each, each.statements, roll=not abreast)
+        for each in series
+    ]
+    return placed(places, texts)
 
 
 # By function: what writes its statements for each index.
@@ -127,10 +120,10 @@ BODIES: dict[str, Callable[[Sources], list[str]]] = {
     "guard_curvature": _curvatures,
     "reset": lambda a: _values(a, a.resets),
     "reset_jacobian": lambda a: _derivatives(a, "slopes", zeros_first, a.resets),
-    "series": _series,
-    "tangent_series": _tangent_series,
-    "series_abreast": _series_abreast,
-    "tangent_series_abreast": _tangent_series_abreast,
+    "series": partial(_series, tangent=False, abreast=False),
+    "tangent_series": partial(_series, tangent=True, abreast=False),
+    "series_abreast": partial(_series, tangent=False, abreast=True),
+    "tangent_series_abreast": partial(_series, tangent=True, abreast=True),
 }
 
 
