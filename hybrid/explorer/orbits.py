@@ -24,6 +24,7 @@ from hybrid.orbits.sections import stroboscopic_section
 from hybrid.simulation.arc import HybridArc
 from hybrid.simulation.simulate import simulate
 from hybrid.status import StatusCode
+from hybrid.system.periodicity import closed_change
 
 # A section repeats if it comes back after no more points than these, to this share of the extent of the arc.
 MOST_DOTS, SAME = 16, 1e-4
@@ -193,9 +194,7 @@ def _attempted(subject: Subject, what: str, call: Call, size: np.ndarray) -> Att
 def _change(subject: Subject, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Differences of states, with angles up to whole turns, and without counters."""
     k = subject.system.tangent_dimension
-    turns = np.asarray(subject.system.turn_lengths, dtype=float)[:k]
-    change = x[..., :k] - y[..., :k]
-    return change - turns * np.round(change / np.where(turns > 0.0, turns, 1.0))
+    return closed_change(x[..., :k] - y[..., :k], subject.system.turn_lengths[:k])
 
 
 def _numbers(scene: Scene, dots: int | None) -> Iterable[int]:
